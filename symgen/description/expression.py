@@ -1,0 +1,436 @@
+"""Exact constants and linear or quadratic forms: polynomials over symbols, from a safe grammar.
+
+The grammar of robot files: numbers, `pi`, declared symbols, `+ - * / ** ( )`, `sin cos tan sqrt`. Text is read by the small
+parser below and never evaluated as Python. An expression is kept as a polynomial with rational coefficients
+
+    e = sum_k c_k prod_i atom_i**n_ki ,      atom = symbol or cos(e), sin(e), sqrt(e), inv(e)
+
+so that two equal forms are equal objects; decimals are exact (0.225 = 9/40) and quarter turns leave cos and sin at once.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from symgen.errors import ExpressionError
+
+FUNCTIONS = ("sin", "cos", "tan", "sqrt")
+MAX_LENGTH, MAX_DEPTH, MAX_EXPONENT, MAX_TERMS, MAX_DIGITS = 2000, 40, 32, 400, 60
+
+Monomial = tuple[tuple["str | Call", int], ...]
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function of an expression that the polynomial cannot hold: cos, sin, sqrt or inv (1/argument)."""
+
+    function: str
+    argument: Expression
+
+    @cached_property
+    def text(self) -> str:
+        return f"1/({self.argument})" if self.function == "inv" else f"{self.function}({self.argument})"
+
+    def __str__(self) -> str:
+        return self.text
+
+
+class Expression:
+    """Polynomial with rational coefficients over symbols and calls; immutable, hashable, equal by value."""
+
+    __slots__ = ("_hash", "terms")
+
+    def __init__(self, terms: Mapping[Monomial, Fraction] | None = None) -> None:
+        self.terms: dict[Monomial, Fraction] = {m: c for m, c in (terms or {}).items() if c}
+        self._hash: int | None = None
+
+    @staticmethod
+    def number(value: int | Fraction | str) -> Expression:
+        return Expression({(): Fraction(value)})
+
+    @staticmethod
+    def symbol(name: str) -> Expression:
+        return Expression({((name, 1),): Fraction(1)})
+
+    @staticmethod
+    def of(value: Expression | int | Fraction) -> Expression:
+        return value if isinstance(value, Expression) else Expression.number(value)
+
+    def __add__(self, other: Expression | int | Fraction) -> Expression:
+        terms = dict(self.terms)
+        for m, c in Expression.of(other).terms.items():
+            terms[m] = terms.get(m, Fraction(0)) + c
+        return Expression(terms)
+
+    def __neg__(self) -> Expression:
+        return Expression({m: -c for m, c in self.terms.items()})
+
+    def __sub__(self, other: Expression | int | Fraction) -> Expression:
+        return self + (-Expression.of(other))
+
+    def __mul__(self, other: Expression | int | Fraction) -> Expression:
+        terms: dict[Monomial, Fraction] = {}
+        for m1, c1 in self.terms.items():
+            for m2, c2 in Expression.of(other).terms.items():
+                m = _product(m1, m2)
+                terms[m] = terms.get(m, Fraction(0)) + c1 * c2
+        return Expression(terms)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __rsub__(self, other: Expression | int | Fraction) -> Expression:
+        return Expression.of(other) - self
+
+    def __pow__(self, exponent: int) -> Expression:
+        if exponent < 0:
+            return self.inverse() ** -exponent
+        if len(self.terms) == 1:
+            ((m, c),) = self.terms.items()
+            return Expression({tuple((a, n * exponent) for a, n in m) if exponent else (): c**exponent})
+        result = Expression.number(1)
+        for _ in range(exponent):
+            result = result * self
+        return result
+
+    def inverse(self) -> Expression:
+        """1/e: a monomial is inverted term by term, a sum becomes the atom inv(e)."""
+        if not self.terms:
+            raise ZeroDivisionError
+        if len(self.terms) == 1:
+            ((m, c),) = self.terms.items()
+            return Expression({tuple((a, -n) for a, n in m): 1 / c})
+        return _atom("inv", self)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expression) and self.terms == other.terms
+
+    def __hash__(self) -> int:
+        if self._hash is None:
+            self._hash = hash(frozenset(self.terms.items()))
+        return self._hash
+
+    def __bool__(self) -> bool:
+        return bool(self.terms)
+
+    @property
+    def constant(self) -> Fraction | None:
+        """The value of an expression without symbols, else None."""
+        if not self.terms:
+            return Fraction(0)
+        return self.terms.get(()) if len(self.terms) == 1 else None
+
+    @property
+    def atoms(self) -> set[str | Call]:
+        return {a for m in self.terms for a, _ in m}
+
+    @property
+    def symbols(self) -> set[str]:
+        """Names of all symbols, those inside calls included; `pi` is not a symbol."""
+        names: set[str] = set()
+        for a in self.atoms:
+            names |= a.argument.symbols if isinstance(a, Call) else {a} - {"pi"}
+        return names
+
+    def coefficient(self, *names: str) -> Expression:
+        """The cofactor of the monomial `names` (each to the first power per mention) in the other atoms."""
+        wanted: dict[str | Call, int] = {}
+        for name in names:
+            wanted[name] = wanted.get(name, 0) + 1
+        terms: dict[Monomial, Fraction] = {}
+        for m, c in self.terms.items():
+            powers = dict(m)
+            if all(powers.get(a, 0) == n for a, n in wanted.items()):
+                terms[tuple((a, n) for a, n in m if a not in wanted)] = c
+        return Expression(terms)
+
+    def substitute(self, values: Mapping[str, Expression]) -> Expression:
+        """Replace symbols by expressions."""
+        result = Expression()
+        for m, c in self.terms.items():
+            term = Expression({(): c})
+            for a, n in m:
+                if isinstance(a, Call):
+                    base = call(a.function, a.argument.substitute(values))
+                else:
+                    base = values.get(a, Expression.symbol(a))
+                term = term * base**n
+            result = result + term
+        return result
+
+    def evaluate(self, value: Callable[[str], Any], function: Callable[[str, Expression], Any], number: Callable[[Fraction], Any]) -> Any:
+        """Fold over any scalars: `value` of a symbol (and of pi), `function(name, argument)` of a call, `number` of a rational."""
+        total: Any = number(Fraction(0))
+        for m, c in sorted(self.terms.items(), key=lambda mc: _order(mc[0])):
+            term: Any = number(c)
+            for a, n in m:
+                base = function(a.function, a.argument) if isinstance(a, Call) else value(a)
+                factor = base
+                for _ in range(abs(n) - 1):
+                    factor = factor * base
+                term = term * factor if n > 0 else term / factor
+            total = total + term
+        return total
+
+    def __float__(self) -> float:
+        return self.value({})
+
+    def value(self, values: Mapping[str, float]) -> float:
+        """The number this expression has where `values` gives its symbols. Raises KeyError naming a missing one."""
+        import math
+
+        def function(name: str, argument: Expression) -> float:
+            x = argument.value(values)
+            return 1.0 / x if name == "inv" else float(getattr(math, name)(x))
+
+        symbols = {"pi": math.pi, **values}
+        return float(self.evaluate(symbols.__getitem__, function, float))
+
+    def __str__(self) -> str:
+        if not self.terms:
+            return "0"
+        text = ""
+        for m, c in sorted(self.terms.items(), key=lambda mc: _order(mc[0])):
+            body = _factors(m, c)
+            sign = "-" if c < 0 else "+"
+            text += (f" {sign} " if text else ("-" if c < 0 else "")) + body
+        return text
+
+    def __repr__(self) -> str:
+        return f"Expression({self})"
+
+
+ZERO, ONE, PI = Expression(), Expression.number(1), Expression.symbol("pi")
+
+
+def decimal(c: Fraction) -> str:
+    """A rational as an exact decimal where it is one of reasonable length, else as p/q."""
+    if c.denominator == 1:
+        return str(c.numerator)
+    d, twos, fives = c.denominator, 0, 0
+    while d % 2 == 0:
+        d, twos = d // 2, twos + 1
+    while d % 5 == 0:
+        d, fives = d // 5, fives + 1
+    places = max(twos, fives)
+    if d != 1 or places > 15 or (twos <= 3 and not fives):
+        return f"{c.numerator}/{c.denominator}"
+    digits = str(abs(c.numerator) * 10**places // c.denominator).rjust(places + 1, "0")
+    return ("-" if c < 0 else "") + digits[:-places] + "." + digits[-places:]
+
+
+def _factors(m: Monomial, c: Fraction) -> str:
+    up = [f"{a}" if n == 1 else f"{a}**{n}" for a, n in m if n > 0 and not _is_inverse(a)]
+    down = [(f"{a}" if n == -1 else f"{a}**{-n}") for a, n in m if n < 0]
+    down += [f"({a.argument})" if n == 1 else f"({a.argument})**{n}" for a, n in m if n > 0 and isinstance(a, Call) and a.function == "inv"]
+    c = abs(c)
+    text = decimal(c)
+    if m and "/" in text:
+        head, _, tail = text.partition("/")
+        down, text = [tail, *down], head
+    if text != "1" or not up:
+        up = [text, *up]
+    return "*".join(up) + "".join(f"/{d}" for d in down)
+
+
+def _is_inverse(a: str | Call) -> bool:
+    return isinstance(a, Call) and a.function == "inv"
+
+
+def _order(m: Monomial) -> tuple[Any, ...]:
+    return (-sum(n for _, n in m), tuple((str(a), -n) for a, n in m))
+
+
+def _product(m1: Monomial, m2: Monomial) -> Monomial:
+    if not m1:
+        return m2
+    if not m2:
+        return m1
+    powers = dict(m1)
+    for a, n in m2:
+        powers[a] = powers.get(a, 0) + n
+    return tuple(sorted(((a, n) for a, n in powers.items() if n), key=lambda an: str(an[0])))
+
+
+def _atom(function: str, argument: Expression) -> Expression:
+    return Expression({((Call(function, argument), 1),): Fraction(1)})
+
+
+def call(function: str, argument: Expression) -> Expression:
+    """cos, sin, tan, sqrt or inv of an expression; quarter turns, signs and perfect squares are taken out exactly."""
+    if function == "tan":
+        return call("sin", argument) * call("cos", argument).inverse()
+    if function == "inv":
+        return argument.inverse()
+    if function == "sqrt":
+        c = argument.constant
+        if c is not None:
+            if c < 0:
+                raise ValueError("square root of a negative number")
+            p, q = _isqrt(c.numerator), _isqrt(c.denominator)
+            if p is not None and q is not None:
+                return Expression.number(Fraction(p, q))
+        return _atom("sqrt", argument)
+    turns, rest = quarter_turns(argument)
+    if function == "sin":
+        turns -= 1  # sin x = cos(x - pi/2)
+    sign = 1
+    if rest and _leading(rest) < 0:  # cos(k pi/2 + x) = cos(-k pi/2 - x)
+        turns, rest = -turns, -rest
+    turns %= 4
+    if turns >= 2:
+        sign, turns = -sign, turns - 2
+    if not rest:
+        return Expression.number(sign if turns == 0 else 0)
+    return _atom("cos", rest) * sign if turns == 0 else _atom("sin", rest) * -sign  # cos(x + pi/2) = -sin x
+
+
+def quarter_turns(angle: Expression) -> tuple[int, Expression]:
+    """angle = k pi/2 + rest, rest without a whole number of quarter turns."""
+    c = angle.terms.get((("pi", 1),), Fraction(0)) * 2
+    k = c.numerator // c.denominator
+    return k, angle - PI * Fraction(k, 2)
+
+
+def _leading(e: Expression) -> Fraction:
+    return e.terms[min(e.terms, key=_order)]
+
+
+def _isqrt(n: int) -> int | None:
+    from math import isqrt
+
+    r = isqrt(n)
+    return r if r * r == n else None
+
+
+# --- text to expression -------------------------------------------------------------------------------------------------
+
+_TOKEN = re.compile(r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<op>\*\*|[-+*/()]))")
+
+
+class _Parser:
+    def __init__(self, text: str, symbols: Iterable[str] | None) -> None:
+        self.text = text
+        self.symbols = None if symbols is None else frozenset(symbols)
+        self.depth = 0
+        self.tokens: list[tuple[str, str, int]] = []
+        if len(text) > MAX_LENGTH:
+            raise self.error(f"expression of {len(text)} characters; at most {MAX_LENGTH} are read", 1)
+        position, end = 0, len(text.rstrip())
+        while position < end:
+            match = _TOKEN.match(text, position)
+            if match is None:
+                at = len(text) - len(text[position:].lstrip())
+                raise self.error(f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** ( ), sin, cos, tan, sqrt", at + 1)
+            kind = str(match.lastgroup)
+            self.tokens.append((kind, match.group(kind), match.start(kind) + 1))
+            position = match.end()
+        self.tokens.append(("end", "end of text", len(text) + 1))
+        self.position = 0
+
+    def error(self, message: str, column: int) -> ExpressionError:
+        return ExpressionError(message, text=self.text, column=column)
+
+    def accept(self, *texts: str) -> str | None:
+        kind, text, _ = self.tokens[self.position]
+        if kind == "op" and text in texts:
+            self.position += 1
+            return text
+        return None
+
+    def guard(self, e: Expression) -> Expression:
+        if len(e.terms) > MAX_TERMS or any(abs(n) > MAX_EXPONENT for m in e.terms for _, n in m):
+            raise self.error(f"expression expands to more than {MAX_TERMS} terms or powers above {MAX_EXPONENT}; introduce a constant", self.tokens[self.position][2])
+        if any(len(str(c.numerator)) + len(str(c.denominator)) > 4 * MAX_DIGITS for c in e.terms.values()):
+            raise self.error("number with too many digits", self.tokens[self.position][2])
+        return e
+
+    def sum(self) -> Expression:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise self.error(f"nested more than {MAX_DEPTH} deep", self.tokens[self.position][2])
+        e = self.product()
+        while op := self.accept("+", "-"):
+            e = self.guard(e + self.product() if op == "+" else e - self.product())
+        self.depth -= 1
+        return e
+
+    def product(self) -> Expression:
+        e = self.unary()
+        while op := self.accept("*", "/"):
+            column = self.tokens[self.position][2]
+            f = self.unary()
+            if op == "/" and not f:
+                raise self.error("division by zero", column)
+            e = self.guard(e * f if op == "*" else e * f.inverse())
+        return e
+
+    def unary(self) -> Expression:
+        negative = False
+        while op := self.accept("+", "-"):
+            negative ^= op == "-"
+        e = self.power()
+        return -e if negative else e
+
+    def power(self) -> Expression:
+        base = self.primary()
+        if self.accept("**"):
+            column = self.tokens[self.position][2]
+            negative = self.accept("-") is not None
+            exponent = self.primary().constant
+            if exponent is None or exponent.denominator != 1 or abs(exponent) > MAX_EXPONENT:
+                raise self.error(f"exponent must be a whole number between -{MAX_EXPONENT} and {MAX_EXPONENT}", column)
+            if negative and not base:
+                raise self.error("division by zero", column)
+            if len(base.terms) > 1 and abs(exponent) > 8:
+                raise self.error("power of a sum above 8; introduce a constant", column)
+            return self.guard(base ** (-int(exponent) if negative else int(exponent)))
+        return base
+
+    def primary(self) -> Expression:
+        kind, text, column = self.tokens[self.position]
+        self.position += 1
+        if kind == "number":
+            mantissa, _, exponent = text.lower().partition("e")
+            if len(mantissa) > MAX_DIGITS or (exponent and abs(int(exponent[:9])) > MAX_DIGITS):
+                raise self.error("number with too many digits", column)
+            return Expression.number(Fraction(text))
+        if kind == "op" and text == "(":
+            e = self.sum()
+            if self.accept(")") is None:
+                raise self.error("missing )", self.tokens[self.position][2])
+            return e
+        if kind == "name":
+            if self.accept("("):
+                if text not in FUNCTIONS:
+                    raise self.error(f"{text!r} is not a function of the grammar; sin, cos, tan and sqrt are", column)
+                e = self.sum()
+                if self.accept(")") is None:
+                    raise self.error("missing )", self.tokens[self.position][2])
+                try:
+                    return call(text, e)
+                except (ValueError, ZeroDivisionError) as error:
+                    raise self.error(f"{text} of {e}: {error or 'division by zero'}", column) from error
+            if text == "pi" or self.symbols is None or text in self.symbols:
+                return Expression.symbol(text)
+            raise self.error(f"undeclared symbol {text!r}; declared here: {', '.join(sorted(self.symbols)) or 'none'}", column)
+        raise self.error(f"expected a number, a symbol or (, found {text!r}", column)
+
+
+def parse(text: str | int | float, symbols: Iterable[str] | None = None) -> Expression:
+    """Read one expression; `symbols` are the declared names (None: any).
+
+    Raises ExpressionError with the column of whatever is outside the grammar.
+    """
+    if isinstance(text, (int, float)) and not isinstance(text, bool):
+        text = repr(text)
+    parser = _Parser(str(text), symbols)
+    e = parser.sum()
+    kind, found, column = parser.tokens[parser.position]
+    if kind != "end":
+        raise parser.error(f"unexpected {found!r} after a complete expression", column)
+    return e

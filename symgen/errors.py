@@ -1,0 +1,43 @@
+"""One root for every error symgen raises on purpose.
+
+A message says what was given, what was expected, where, and what to do; the offending values are attributes.
+"""
+
+from __future__ import annotations
+
+
+class SymgenError(Exception):
+    """Root of all errors raised on bad input or on a derivation that cannot be completed."""
+
+
+class DescriptionError(SymgenError):
+    """A robot file (or a Robot built in Python) that does not describe a mechanism.
+
+    Parameters
+    ----------
+    message : what was given, what was expected and what to do.
+    path : keys that lead to the offending field, e.g. ("frames", 4, "sigma"); a file reader turns them into a line.
+    file, line : where; `line` counts from 1.
+    """
+
+    def __init__(self, message: str, *, path: tuple[str | int, ...] = (), file: str | None = None, line: int | None = None) -> None:
+        self.message, self.path, self.file, self.line = message, path, file, line
+        place = "" if file is None else f" ({file}{'' if line is None else f', line {line}'})"
+        super().__init__(message + place)
+
+
+class ExpressionError(SymgenError):
+    """A text that is not an expression of the robot-file grammar; `column` counts from 1."""
+
+    def __init__(self, message: str, *, text: str, column: int | None = None) -> None:
+        self.text, self.column = text, column
+        place = "" if column is None else f" at column {column}"
+        super().__init__(f"{message}{place} in {text[:80]!r}")
+
+
+class CertificateError(SymgenError):
+    """A regrouping that its certificate refuses; `failures` lists what did not hold."""
+
+    def __init__(self, message: str, failures: tuple[str, ...] = ()) -> None:
+        self.failures = failures
+        super().__init__(message)
