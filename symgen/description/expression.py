@@ -309,7 +309,7 @@ def _isqrt(n: int) -> int | None:
 
 # --- text to expression -------------------------------------------------------------------------------------------------
 
-_TOKEN = re.compile(r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<op>\*\*|[-+*/()]))")
+_TOKEN = re.compile(r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<op>\*\*|[-+*/()]))", re.ASCII)
 
 
 class _Parser:
@@ -384,11 +384,15 @@ class _Parser:
             exponent = self.primary().constant
             if exponent is None or exponent.denominator != 1 or abs(exponent) > MAX_EXPONENT:
                 raise self.error(f"exponent must be a whole number between -{MAX_EXPONENT} and {MAX_EXPONENT}", column)
-            if negative and not base:
+            n = -int(exponent) if negative else int(exponent)
+            if n < 0 and not base:
                 raise self.error("division by zero", column)
-            if len(base.terms) > 1 and abs(exponent) > 8:
+            if len(base.terms) > 1 and abs(n) > 8:
                 raise self.error("power of a sum above 8; introduce a constant", column)
-            return self.guard(base ** (-int(exponent) if negative else int(exponent)))
+            factor, result = base.inverse() if n < 0 else base, Expression.number(1)
+            for _ in range(abs(n)):  # guarded step by step: nested powers are refused before they grow
+                result = self.guard(result * factor)
+            return result
         return base
 
     def primary(self) -> Expression:

@@ -123,7 +123,7 @@ class Robot:
     constraints: Mapping[int, Expression] = field(default_factory=dict)
     massless: frozenset[int] = frozenset()
     drives: Drives | None = None
-    limits: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    limits: Mapping[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = field(default_factory=dict)  # q: (lower, upper); qd, qdd, tau: largest
     values: Mapping[str, float] = field(default_factory=dict)
     file: str = ""  # name of the file, without its folder
     sha256: str = ""  # of its bytes
@@ -206,6 +206,8 @@ STEM = re.compile(r"(?:[A-Z]+[a-z]*)\d[\d_]*R?\Z|(?:C|S)\d[\d_]*\Z|q\d+\Z|(?:QP|
 
 def _check(robot: Robot) -> None:
     check_identifier(robot.name, ("name",))
+    for name in ("title", "source", "file"):
+        _check_text(getattr(robot, name), name)
     _check_tree(robot)
     _check_names(robot)
     _check_geometry(robot)
@@ -218,6 +220,12 @@ def _check(robot: Robot) -> None:
 def check_identifier(name: str, path: Path) -> None:
     if not IDENTIFIER.match(name) or keyword.iskeyword(name):
         raise DescriptionError(f"{name!r} is no identifier; use a letter followed by letters, digits or _ (at most 40)", path=path)
+
+
+def _check_text(text: str, name: str) -> None:
+    """Titles end up in docstrings and comments of emitted files: nothing in them may close one."""
+    if not text.isprintable() or len(text) > 1000 or any(mark in text for mark in ("\\", '"""', "*/", "/*")):
+        raise DescriptionError(f"{name} {text[:60]!r}: expected one line of printable text, at most 1000 characters, without \\, triple quotes, /* or */", path=(name,))
 
 
 def _check_tree(robot: Robot) -> None:
@@ -347,6 +355,9 @@ def _check_tables(robot: Robot) -> None:
     for name, row in robot.limits.items():
         if name not in ("q", "qd", "qdd", "tau") or len(row) != n:
             raise DescriptionError(f"limits: {name} has {len(row)} entries; expected q, qd, qdd, tau with {n} numbers each", path=("limits", name))
+        for i, entry in enumerate(row):
+            if (low_high := entry if isinstance(entry, tuple) else (0.0, entry)) and not low_high[0] < low_high[1]:
+                raise DescriptionError(f"limits: {name} of joint {robot.joints[i]} is {entry}; expected lower < upper, or a positive number", path=("limits", name, i))
     for name in robot.values:
         if name not in robot.parameters:
             raise DescriptionError(f"values: {name!r} is not a standard parameter of {robot.name}", path=("values", name))
