@@ -309,7 +309,9 @@ def _isqrt(n: int) -> int | None:
 
 # --- text to expression -------------------------------------------------------------------------------------------------
 
-_TOKEN = re.compile(r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<op>\*\*|[-+*/()]))", re.ASCII)
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<op>\*\*|[-+*/()]))", re.ASCII
+)
 
 
 class _Parser:
@@ -325,7 +327,9 @@ class _Parser:
             match = _TOKEN.match(text, position)
             if match is None:
                 at = len(text) - len(text[position:].lstrip())
-                raise self.error(f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** ( ), sin, cos, tan, sqrt", at + 1)
+                raise self.error(
+                    f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** ( ), sin, cos, tan, sqrt", at + 1
+                )
             kind = str(match.lastgroup)
             self.tokens.append((kind, match.group(kind), match.start(kind) + 1))
             position = match.end()
@@ -344,7 +348,10 @@ class _Parser:
 
     def guard(self, e: Expression) -> Expression:
         if len(e.terms) > MAX_TERMS or any(abs(n) > MAX_EXPONENT for m in e.terms for _, n in m):
-            raise self.error(f"expression expands to more than {MAX_TERMS} terms or powers above {MAX_EXPONENT}; introduce a constant", self.tokens[self.position][2])
+            raise self.error(
+                f"expression expands to more than {MAX_TERMS} terms or powers above {MAX_EXPONENT}; introduce a constant",
+                self.tokens[self.position][2],
+            )
         if any(len(str(c.numerator)) + len(str(c.denominator)) > 4 * MAX_DIGITS for c in e.terms.values()):
             raise self.error("number with too many digits", self.tokens[self.position][2])
         return e

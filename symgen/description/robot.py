@@ -110,7 +110,10 @@ class Drives:
 
 @dataclass(frozen=True)
 class Robot:
-    """A mechanism, complete and checked; raises DescriptionError (with the path of the field) if it is none."""
+    """A mechanism, complete and checked; raises DescriptionError (with the path of the field) if it is none.
+
+    `limits`, one entry per actuated joint: q as (lower, upper), qd, qdd and tau as largest absolute values.
+    """
 
     name: str
     frames: tuple[Frame, ...]
@@ -123,7 +126,7 @@ class Robot:
     constraints: Mapping[int, Expression] = field(default_factory=dict)
     massless: frozenset[int] = frozenset()
     drives: Drives | None = None
-    limits: Mapping[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = field(default_factory=dict)  # q: (lower, upper); qd, qdd, tau: largest
+    limits: Mapping[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     file: str = ""  # name of the file, without its folder
     sha256: str = ""  # of its bytes
@@ -225,7 +228,10 @@ def check_identifier(name: str, path: Path) -> None:
 def _check_text(text: str, name: str) -> None:
     """Titles end up in docstrings and comments of emitted files: nothing in them may close one."""
     if not text.isprintable() or len(text) > 1000 or any(mark in text for mark in ("\\", '"""', "*/", "/*")):
-        raise DescriptionError(f"{name} {text[:60]!r}: expected one line of printable text, at most 1000 characters, without \\, triple quotes, /* or */", path=(name,))
+        raise DescriptionError(
+            f"{name} {text[:60]!r}: expected one line of printable text, at most 1000 characters, without \\, triple quotes, /* or */",
+            path=(name,),
+        )
 
 
 def _check_tree(robot: Robot) -> None:
@@ -241,13 +247,18 @@ def _check_tree(robot: Robot) -> None:
         if f.sigma not in (REVOLUTE, PRISMATIC, FIXED):
             raise DescriptionError(f"joint {f.j}: sigma = {f.sigma}; expected 0 revolute, 1 prismatic or 2 fixed", path=(*where, "sigma"))
         if f.mu not in (0, 1) or (f.mu and f.sigma == FIXED):
-            raise DescriptionError(f"joint {f.j}: mu = {f.mu}; expected 1 actuated or 0 passive, and 0 for a fixed frame", path=(*where, "mu"))
+            raise DescriptionError(
+                f"joint {f.j}: mu = {f.mu}; expected 1 actuated or 0 passive, and 0 for a fixed frame", path=(*where, "mu")
+            )
         if f.ant == f.j or f.ant > len(numbers) or f.ant < 0:
             raise DescriptionError(f"frame {f.j}: ant = {f.ant}; expected an earlier frame, 0 for the base", path=(*where, "ant"))
         seen, i = {f.j}, f.ant
         while i:
             if i in seen:
-                raise DescriptionError(f"frames {sorted(seen)} are each other's antecedents (a cycle); every chain of `ant` must end at 0", path=(*where, "ant"))
+                raise DescriptionError(
+                    f"frames {sorted(seen)} are each other's antecedents (a cycle); every chain of `ant` must end at 0",
+                    path=(*where, "ant"),
+                )
             seen.add(i)
             i = robot.frames[i - 1].ant
         if f.ant > f.j:
@@ -261,13 +272,18 @@ def _check_names(robot: Robot) -> None:
     for family in families:
         check_identifier(family, ("elements", family))
         if family in INERTIAL or families.count(family) > 1 or family[-1].isdigit() or family.endswith("_"):
-            raise DescriptionError(f"element {family!r}: give each family a name of its own, not an inertial parameter's, that does not end in a digit or _", path=("elements", family))
+            raise DescriptionError(
+                f"element {family!r}: give each family a name of its own, not an inertial parameter's, that does not end in a digit or _",
+                path=("elements", family),
+            )
     names = set(robot.parameters)
     taken = names | {n + "R" for n in names} | ARGUMENTS
     for name in robot.constants:
         check_identifier(name, ("constants", name))
         if name in taken or re.fullmatch(r"q\d+", name) or name.startswith("__"):
-            raise DescriptionError(f"constant {name!r} is the name of a parameter, joint or argument; choose another", path=("constants", name))
+            raise DescriptionError(
+                f"constant {name!r} is the name of a parameter, joint or argument; choose another", path=("constants", name)
+            )
     if len(names) != len(robot.parameters):
         double = sorted(n for n in names if robot.parameters.count(n) > 1)
         raise DescriptionError(f"parameters {double} would be named twice; rename an element family", path=("elements",))
@@ -277,13 +293,14 @@ def _declared(robot: Robot, e: Expression, path: Path, allowed: set[str] = froze
     unknown = e.symbols - set(robot.constants) - set(allowed)
     if unknown:
         raise DescriptionError(
-            f"undeclared symbol {', '.join(sorted(unknown))}; declare it under constants (declared: {', '.join(robot.constants) or 'none'})", path=path
+            f"undeclared symbol {', '.join(sorted(unknown))}; declare it under constants (declared: {', '.join(robot.constants) or 'none'})",
+            path=path,
         )
 
 
 def _check_geometry(robot: Robot) -> None:
-    for k, e in enumerate(robot.gravity):
-        _declared(robot, e, ("gravity", k))
+    for k, component in enumerate(robot.gravity):
+        _declared(robot, component, ("gravity", k))
     for f in robot.frames:
         for name in ("gamma", "b", "alpha", "d", "theta", "r"):
             where = ("frames", f.j, name)
@@ -299,7 +316,9 @@ def _check_element(robot: Robot, e: Element) -> None:
     if e.kind not in KINDS:
         raise DescriptionError(f"element {e.family}: kind {e.kind!r}; expected one of {', '.join(KINDS)}", path=(*where, "kind"))
     if e.when is not None and (e.when not in DIRECTIONS or e.kind not in ("viscous", "coulomb")):
-        raise DescriptionError(f"element {e.family}: when {e.when!r}; viscous and coulomb elements take positive or negative", path=(*where, "when"))
+        raise DescriptionError(
+            f"element {e.family}: when {e.when!r}; viscous and coulomb elements take positive or negative", path=(*where, "when")
+        )
     if not e.along and not e.form:
         raise DescriptionError(f"element {e.family}: acts along nothing; give `along` or `form`", path=where)
     if e.form and e.kind in ("coulomb", "offset"):
@@ -307,8 +326,11 @@ def _check_element(robot: Robot, e: Element) -> None:
     if e.form and e.when:
         raise DescriptionError(f"element {e.family}: `when` needs a direction of motion, hence `along`, not `form`", path=(*where, "when"))
     if set(e.along) & set(e.form):
-        raise DescriptionError(f"element {e.family}: keys {sorted(set(e.along) & set(e.form))} in both along and form", path=(*where, "form"))
-    for part, table in (("along", e.along), ("form", e.form)):
+        raise DescriptionError(
+            f"element {e.family}: keys {sorted(set(e.along) & set(e.form))} in both along and form", path=(*where, "form")
+        )
+    tables: tuple[tuple[str, Mapping[int, Row | Form]], ...] = (("along", e.along), ("form", e.form))
+    for part, table in tables:
         for j, coefficients in table.items():
             place = (*where, part, j)
             if j not in robot._by_number:
@@ -316,7 +338,9 @@ def _check_element(robot: Robot, e: Element) -> None:
             for index, c in coefficients.items():
                 for i in (index,) if isinstance(index, int) else index:
                     if i not in robot.moving:
-                        raise DescriptionError(f"element {e.family}{j}: q{i} is not a joint of this robot (joints {list(robot.moving)})", path=place)
+                        raise DescriptionError(
+                            f"element {e.family}{j}: q{i} is not a joint of this robot (joints {list(robot.moving)})", path=place
+                        )
                 _declared(robot, c, place)
             if not any(coefficients.values()):
                 raise DescriptionError(f"element {e.family}{j}: zero along every joint", path=place)
@@ -329,16 +353,22 @@ def _check_loops(robot: Robot) -> None:
             if getattr(loop, name) not in robot._by_number:
                 raise DescriptionError(f"loop {k + 1}: {name} frame {getattr(loop, name)} does not exist", path=(*where, name))
         if robot.frame(loop.twin).sigma != FIXED:
-            raise DescriptionError(f"loop {k + 1}: twin frame {loop.twin} has sigma {robot.frame(loop.twin).sigma}; expected 2 (fixed on its link)", path=(*where, "twin"))
+            raise DescriptionError(
+                f"loop {k + 1}: twin frame {loop.twin} has sigma {robot.frame(loop.twin).sigma}; expected 2 (fixed on its link)",
+                path=(*where, "twin"),
+            )
         if robot.frame(loop.cut).mu:
             raise DescriptionError(f"loop {k + 1}: cut joint {loop.cut} is actuated; cut a passive joint (mu: 0)", path=(*where, "cut"))
     for j, e in robot.constraints.items():
-        where = ("constraints", f"q{j}")
+        place = ("constraints", f"q{j}")
         if j not in robot.passive:
-            raise DescriptionError(f"constraint on q{j}: not a passive joint (passive: {list(robot.passive)})", path=where)
-        _declared(robot, e, where, {f"q{i}" for i in robot.moving})
+            raise DescriptionError(f"constraint on q{j}: not a passive joint (passive: {list(robot.passive)})", path=place)
+        _declared(robot, e, place, {f"q{i}" for i in robot.moving})
     if robot.passive and not robot.loops and not robot.constraints:
-        raise DescriptionError(f"joints {list(robot.passive)} are passive but there is no loop and no constraint; set mu: 1 or add one", path=("frames", robot.passive[0], "mu"))
+        raise DescriptionError(
+            f"joints {list(robot.passive)} are passive but there is no loop and no constraint; set mu: 1 or add one",
+            path=("frames", robot.passive[0], "mu"),
+        )
 
 
 def _check_tables(robot: Robot) -> None:
@@ -346,18 +376,29 @@ def _check_tables(robot: Robot) -> None:
     if robot.drives is not None:
         shape = [len(row) for row in robot.drives.ratio]
         if shape != [n] * n:
-            raise DescriptionError(f"drives: ratio has rows of {shape}; expected {n} rows of {n}, one per actuated joint", path=("drives", "ratio"))
+            raise DescriptionError(
+                f"drives: ratio has rows of {shape}; expected {n} rows of {n}, one per actuated joint", path=("drives", "ratio")
+            )
         if _determinant(robot.drives.ratio) == 0:
-            raise DescriptionError("drives: ratio is singular; motor positions must determine the joint positions", path=("drives", "ratio"))
+            raise DescriptionError(
+                "drives: ratio is singular; motor positions must determine the joint positions", path=("drives", "ratio")
+            )
         for name in ("offset", "torque_constant"):
             if len(getattr(robot.drives, name)) != n:
-                raise DescriptionError(f"drives: {name} has {len(getattr(robot.drives, name))} entries; expected {n}", path=("drives", name))
+                raise DescriptionError(
+                    f"drives: {name} has {len(getattr(robot.drives, name))} entries; expected {n}", path=("drives", name)
+                )
     for name, row in robot.limits.items():
         if name not in ("q", "qd", "qdd", "tau") or len(row) != n:
-            raise DescriptionError(f"limits: {name} has {len(row)} entries; expected q, qd, qdd, tau with {n} numbers each", path=("limits", name))
+            raise DescriptionError(
+                f"limits: {name} has {len(row)} entries; expected q, qd, qdd, tau with {n} numbers each", path=("limits", name)
+            )
         for i, entry in enumerate(row):
             if (low_high := entry if isinstance(entry, tuple) else (0.0, entry)) and not low_high[0] < low_high[1]:
-                raise DescriptionError(f"limits: {name} of joint {robot.joints[i]} is {entry}; expected lower < upper, or a positive number", path=("limits", name, i))
+                raise DescriptionError(
+                    f"limits: {name} of joint {robot.joints[i]} is {entry}; expected lower < upper, or a positive number",
+                    path=("limits", name, i),
+                )
     for name in robot.values:
         if name not in robot.parameters:
             raise DescriptionError(f"values: {name!r} is not a standard parameter of {robot.name}", path=("values", name))
@@ -412,4 +453,22 @@ def _moves(c: Expression) -> bool:
     return any(re.fullmatch(r"q\d+", name) for name in c.symbols)
 
 
-__all__ = ["DIRECTIONS", "FIXED", "INERTIAL", "JOINT_FAMILIES", "KINDS", "ONE", "PRISMATIC", "REVOLUTE", "ZERO", "Drives", "Element", "Frame", "Loop", "Robot", "form_of", "parameter", "row_of"]
+__all__ = [
+    "DIRECTIONS",
+    "FIXED",
+    "INERTIAL",
+    "JOINT_FAMILIES",
+    "KINDS",
+    "ONE",
+    "PRISMATIC",
+    "REVOLUTE",
+    "ZERO",
+    "Drives",
+    "Element",
+    "Frame",
+    "Loop",
+    "Robot",
+    "form_of",
+    "parameter",
+    "row_of",
+]
