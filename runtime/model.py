@@ -1,0 +1,37 @@
+"""The border to emitted modules: what they offer, how one is found and checked, and checks of the states given to it.
+
+A model is a plain Python module written by the generator (NumPy only). A module given by path is parsed before it runs: it may hold constants,
+functions and classes over numpy and nothing else, so that a file received from elsewhere cannot act behind its formulas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+Array = np.ndarray
+
+
+class GeneratedModel(Protocol):
+    """What `runtime` uses of an emitted module: n joints, b base parameters, q, qd, qdd of shape (N, n)."""
+
+    NAME: str
+    JOINTS: tuple[int, ...]
+    BASE_PARAMETERS: tuple[str, ...]
+    STRUCTURE: Array  # bool (b, n): False where the entry is identically zero
+    DRIVES: Mapping[str, Any] | None
+    LIMITS: Mapping[str, Any]
+    VALUES: Mapping[str, float]
+    CONSTANTS: Mapping[str, float]
+    SOURCE_SHA256: str
+
+    def store(self, N: int) -> Array:
+        """Workspace of shape (b, n, N) for `out`, structural zeros written."""
+
+    def regressor(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+        """D, shape (N, n, b), eq. (5)."""
+
+    def observation_matrix(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+        """W, shape (n*N, b), rows joint-major, Fortran order, eq. (6)."""

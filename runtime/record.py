@@ -1,0 +1,77 @@
+"""A measured record: time, joint positions and joint torques, joint side, SI.
+
+    record = read_record(study.record[0], drives, folder=study_file.parent)
+
+Units and side are explicit in the settings, never guessed. Steps: read the columns, scale, units, then the drives (motor side only). Bad
+input raises InputError, which names file, column and sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from runtime.errors import InputError
+
+Array = np.ndarray
+
+SHORTEST = 10  # samples: fewer cannot be filtered nor differentiated twice
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """What was measured, joint side, SI, uniformly sampled. The arrays are read-only copies.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,), s.   q : ndarray, shape (N, n), rad or m.   tau : ndarray, shape (N, n), N m or N.
+    rate : sampling rate, Hz.
+    files : SHA-256 (of the uncompressed bytes) by file name, for the provenance of results.
+    """
+
+    t: Array
+    q: Array
+    tau: Array
+    rate: float
+    name: str = "record"
+    files: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        t, q, tau = (np.array(x, dtype=float) for x in (self.t, self.q, self.tau))
+        q, tau = (x[:, None] if x.ndim == 1 else x for x in (q, tau))
+        if t.ndim != 1 or q.ndim != 2 or q.shape != tau.shape or len(q) != len(t):
+            raise InputError(f"t {t.shape}, q {q.shape}, tau {tau.shape}; expected (N,), (N, n), (N, n)", file=self.name)
+        if len(t) < SHORTEST:
+            raise InputError(f"{len(t)} samples; a record has at least {SHORTEST}", file=self.name)
+        if not (np.isfinite(self.rate) and self.rate > 0):
+            raise InputError(f"rate {self.rate} Hz; expected a positive number", file=self.name)
+        for label, x in (("t", t[:, None]), ("q", q), ("tau", tau)):
+            check_finite(x, [label] if label == "t" else [f"{label}{j + 1}" for j in range(x.shape[1])], self.name)
+        for label, x in (("t", t), ("q", q), ("tau", tau)):
+            x.setflags(write=False)
+            object.__setattr__(self, label, x)
+        object.__setattr__(self, "files", MappingProxyType(dict(self.files)))
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[1])
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+
+def check_finite(x: Array, names: list[str], file: str) -> None:
+    """Raise InputError at the first value of x, shape (N, columns), that is not finite; samples count from 1."""
+    bad = np.argwhere(~np.isfinite(x))
+    if len(bad):
+        i, j = bad[0]
+        raise InputError(
+            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut the record",
+            file=file,
+            column=names[j],
+            row=f"sample {i + 1}",
+        )
