@@ -1,0 +1,266 @@
+"""What every estimator returns: parameters with an honest statement of how far to trust them.
+
+Equation numbers are those of the chapter (Experimental identification of the inverse dynamic model: minimal encoder resolution):
+
+    X        (7)     sigma_rho  (9)  = ||Y - W X|| / sqrt(r - b)
+    sigma    (10)    = square roots of the diagonal of C = sigma_rho^2 (W'W)^-1
+    %sigma   (11)    = 100 sigma / |X|
+
+Eq. (10) supposes independent residuals; filtered ones are not. `sigma_corrected` stands beside it: blocks of time are taken as
+independent instead of samples (`runtime.estimators.correlated`). What a record does not determine is nan in memory and null in JSON.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray
+
+SCHEMA = 1
+"""Version of the JSON layout."""
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """Fit of the rows of one joint, torques in N m (N for prismatic joints).
+
+    rows : rows of the joint in W.
+    residual_norm : ||Y_j - W_j X||.
+    relative_error : 100 ||Y_j - W_j X|| / ||Y_j||, in %.
+    sigma_rho : ||Y_j - W_j X|| / sqrt(N_j (1 - b/r)), the share of joint j in eq. (9).
+    scale : the s_j its rows were divided by (1 without weights).
+    """
+
+    joint: str
+    rows: int
+    residual_norm: float
+    relative_error: float
+    sigma_rho: float
+    scale: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters, their uncertainty and the quality of the fit.
+
+    names, X : parameters in column order; X, shape (b,), SI units (`units` by name where the model tells them).
+    sigma : ndarray, shape (b,), eq. (10); nan where the record does not determine the parameter.
+    covariance : ndarray, shape (b, b), eq. (10).
+    sigma_corrected : ndarray, shape (b,), sigma without the assumption of independent residuals.
+    sigma_rho : eq. (9) of the system that was solved: N m without weights, near 1 (no unit) with weights.
+    cond, cond_unit : condition number of that W, and of W with columns of norm 1; inf when rank-deficient.
+    rank : numerical rank judged with unit columns.
+    residual_norm, relative_error : ||Y - W X|| in N m and 100 ||Y - W X|| / ||Y|| in %, without weights.
+    per_joint : the same by joint.
+    status : "ok", "rank-deficient", "no-redundancy" (no more rows than parameters), "singular-weights" or "not-converged";
+        `message` explains.
+    groups : for "rank-deficient": the names that cannot be told apart, group by group.
+    settings, provenance : what was asked for; hashes, versions and seed that reproduce it.
+    """
+
+    names: tuple[str, ...]
+    X: Array
+    sigma: Array
+    covariance: Array
+    sigma_corrected: Array
+    sigma_rho: float
+    cond: float
+    cond_unit: float
+    rank: int
+    residual_norm: float
+    relative_error: float
+    per_joint: tuple[JointFit, ...]
+    method: str
+    status: str = "ok"
+    message: str = ""
+    groups: tuple[tuple[str, ...], ...] = ()
+    iterations: int = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        b = len(self.names)
+        for name, shape in (("X", (b,)), ("sigma", (b,)), ("sigma_corrected", (b,)), ("covariance", (b, b))):
+            array = np.array(getattr(self, name), dtype=float)
+            if array.shape != shape:
+                raise ValueError(f"{name} has shape {array.shape}; {b} names ask for {shape}")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @property
+    def relative_sigma(self) -> Array:
+        """%sigma of eq. (11), shape (b,), in %; inf for a parameter estimated as exactly zero."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(100 * self.sigma / np.abs(self.X))
+
+    @property
+    def rows(self) -> int:
+        """Number of rows r of W."""
+        return sum(fit.rows for fit in self.per_joint)
+
+    def __getitem__(self, name: str) -> float:
+        """Value of one parameter."""
+        return float(self.X[self.names.index(name)])
+
+    def __str__(self) -> str:
+        return self.to_table()
+
+    def to_json(self) -> str:
+        """JSON text of every field (design: estimate.json); numbers that do not exist are null."""
+        return json_text(
+            {
+                "schema": SCHEMA,
+                "names": self.names,
+                "X": self.X,
+                "sigma": self.sigma,
+                "relative_sigma": self.relative_sigma,
+                "sigma_corrected": self.sigma_corrected,
+                "cond": self.cond,
+                "cond_unit": self.cond_unit,
+                "rank": self.rank,
+                "sigma_rho": self.sigma_rho,
+                "residual_norm": self.residual_norm,
+                "relative_error": self.relative_error,
+                "rows": self.rows,
+                "per_joint": self.per_joint,
+                "method": self.method,
+                "status": self.status,
+                "message": self.message,
+                "groups": self.groups,
+                "iterations": self.iterations,
+                "settings": self.settings,
+                "provenance": self.provenance,
+                "units": self.units,
+                "covariance": self.covariance,
+            }
+        )
+
+    @classmethod
+    def from_json(cls, text: str) -> Estimate:
+        """The Estimate that `to_json` wrote."""
+        data = json.loads(text)
+        if data.get("schema") != SCHEMA:
+            raise ValueError(f"estimate.json has schema {data.get('schema')!r}; this version reads schema {SCHEMA}")
+        given = {f.name: data[f.name] for f in dataclasses.fields(cls)}
+        for name in ("X", "sigma", "sigma_corrected", "covariance"):
+            given[name] = np.array(given[name], dtype=float)
+        given["covariance"] = given["covariance"].reshape(len(data["names"]), len(data["names"]))
+        for name, missing in (
+            ("cond", math.inf),
+            ("cond_unit", math.inf),
+            *((n, math.nan) for n in ("sigma_rho", "residual_norm", "relative_error")),
+        ):
+            given[name] = missing if given[name] is None else given[name]
+        given["names"] = tuple(given["names"])
+        given["groups"] = tuple(tuple(group) for group in given["groups"])
+        given["per_joint"] = tuple(_joint_fit(fit) for fit in given["per_joint"])
+        return cls(**given)
+
+    def to_table(self) -> str:
+        """Plain text: one line per parameter, one per joint."""
+        head = [
+            f"{self.method}: {self.rows} rows, {len(self.names)} parameters, rank {self.rank}, status {self.status}",
+            f"cond {self.cond:.4g} (unit columns {self.cond_unit:.4g}), sigma_rho {self.sigma_rho:.4g}, "
+            f"residual norm {self.residual_norm:.6g}, relative error {self.relative_error:.3f} %",
+        ]
+        lines: list[Sequence[str]] = [("parameter", "value", "sigma", "%sigma", "corrected", "unit")]
+        for i, name in enumerate(self.names):
+            numbers = (f"{self.X[i]:.6g}", _number(self.sigma[i], ".3g"), _number(self.relative_sigma[i], ".3f"))
+            lines.append((name, *numbers, _number(self.sigma_corrected[i], ".3g"), self.units.get(name, "")))
+        joints: list[Sequence[str]] = [("joint", "rows", "residual norm", "relative error %", "sigma_rho", "scale")]
+        for fit in self.per_joint:
+            norms = (f"{fit.residual_norm:.6g}", _number(fit.relative_error, ".3f"), _number(fit.sigma_rho, ".4g"))
+            joints.append((fit.joint, str(fit.rows), *norms, f"{fit.scale:.4g}"))
+        note = ["", self.message] if self.message else []
+        return "\n".join([*head, "", aligned(lines), "", aligned(joints), *note])
+
+    def to_latex(self, names: Sequence[str] | None = None) -> str:
+        """LaTeX tabular with the columns of the chapter's Table 2; `names` restricts and orders its lines."""
+        lines = [r"\begin{tabular}{lrr}", r"\hline", r"Mechanical parameters & Value & Relative deviation \%$\sigma$ \\", r"\hline"]
+        relative = self.relative_sigma
+        for name in self.names if names is None else names:
+            i = self.names.index(name)
+            unit = _latex_unit(self.units.get(name, ""))
+            lines.append(rf"{_latex_name(name)}{unit} & ${_latex_number(self.X[i])}$ & {_number(relative[i], '.3f')} \\")
+        return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
+
+
+def aligned(lines: Sequence[Sequence[str]]) -> str:
+    """Columns of text under a header: the first column to the left, numbers to the right."""
+    widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]
+    text = []
+    for line in lines:
+        cells = [line[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True))]
+        text.append("  ".join(cells).rstrip())
+    return "\n".join(text)
+
+
+def plain(value: Any) -> Any:
+    """`value` as JSON knows it: mappings, lists, text, finite numbers; what is not finite becomes null.
+
+    Dataclasses become mappings of their fields, arrays lists, anything else its text.
+    """
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int | str) else str(value)
+
+
+def json_text(value: Any) -> str:
+    """`plain(value)` as JSON, indented by two, lists of scalars on one line, with a final newline."""
+    return _render(plain(value), "") + "\n"
+
+
+def _render(value: Any, indent: str) -> str:
+    deeper = indent + "  "
+    if isinstance(value, dict) and value:
+        items = [f"{deeper}{json.dumps(key, ensure_ascii=False)}: {_render(item, deeper)}" for key, item in value.items()]
+        return "{\n" + ",\n".join(items) + f"\n{indent}}}"
+    if isinstance(value, list) and any(isinstance(item, list | dict) for item in value):
+        return "[\n" + ",\n".join(deeper + _render(item, deeper) for item in value) + f"\n{indent}]"
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def _joint_fit(data: Mapping[str, Any]) -> JointFit:
+    known: dict[str, Any] = {key: math.nan if value is None else value for key, value in data.items()}
+    return JointFit(**known)
+
+
+def _number(value: float, form: str) -> str:
+    return format(value, form) if math.isfinite(value) else "-"
+
+
+def _latex_name(name: str) -> str:
+    found = re.fullmatch(r"([A-Za-z]+)(\d\w*)", name)
+    if found is None:
+        return rf"$\mathrm{{{name}}}$".replace("_", r"\_")
+    index = found[2].replace("_", r"\_")
+    return rf"$\mathrm{{{found[1]}}}_{{\mathrm{{{index}}}}}$"
+
+
+def _latex_unit(unit: str) -> str:
+    if not unit:
+        return ""
+    text = re.sub(r"(\*\*|\^)(-?\d+)", r"^{\2}", unit).replace("*", r"\,")
+    return rf" ($\mathrm{{{text}}}$)"
+
+
+def _latex_number(value: float) -> str:
+    text = f"{value:.4g}"
+    return re.sub(r"e([+-])0*(\d+)$", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)

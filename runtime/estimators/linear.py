@@ -1,0 +1,206 @@
+"""From a factored linear system to an Estimate: eqs. (7)-(11), rank and residuals by joint, all from triangular factors.
+
+A System is the rows as a method weighs them. Ordinary least squares leaves them as they are; weighted least squares divides the rows of joint
+j by s_j. Removing columns from a System is cheap, which is what `runtime.essential` lives on; weights stay as they are while columns go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+import scipy
+
+from runtime.errors import SettingsError
+from runtime.estimate import Estimate, JointFit
+from runtime.estimators.correlated import block_covariance, block_of_rows, default_block
+from runtime.estimators.solution import Solution, solve
+from runtime.estimators.triangular import Array, Factor, factor
+from runtime.model import GeneratedModel
+from runtime.observation import Observation
+from runtime.study import EstimateSettings, to_mapping
+
+OPTIONS = ("rank_tolerance", "block")
+"""Options every linear method takes: smallest s_i/s_1 with unit columns that counts as rank; length of a block of residuals, s."""
+
+
+@dataclass(frozen=True)
+class System:
+    """The factored rows of one observation.
+
+    observation : the rows, all columns.
+    raw : factor of [W Y]; weighted : factor of the system that is solved. Both hold the columns still in play.
+    scales : s_j of each joint, by which its rows are divided; 1 without weights.
+    whitener : ndarray, shape (n, n), that multiplies the n rows of one instant instead, or None.
+    known_variance : C = (W'W)^-1 of the weighted system, as its rows have variance 1; else C = sigma_rho^2 (W'W)^-1.
+    """
+
+    observation: Observation
+    settings: EstimateSettings
+    raw: Factor
+    weighted: Factor
+    scales: tuple[float, ...]
+    whitener: Array | None = None
+    known_variance: bool = False
+    iterations: int = 0
+    status: str = "ok"
+    message: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Columns still in play."""
+        return self.raw.names
+
+    def select(self, names: Sequence[str]) -> System:
+        """The system with the columns `names` only."""
+        return replace(self, raw=self.raw.select(names), weighted=self.weighted.select(names))
+
+    def drop(self, name: str) -> System:
+        """The system without one column, by down-dating its triangular factor."""
+        return replace(self, raw=self.raw.drop(name), weighted=self.weighted.drop(name))
+
+    def solve(self) -> Solution:
+        """Least-squares solution of the weighted system."""
+        return solve(self.weighted, self.options.get("rank_tolerance"))
+
+
+def checked_options(settings: EstimateSettings, known: Sequence[str] = OPTIONS) -> Mapping[str, Any]:
+    """settings.options, refused when one is unknown or not a positive number."""
+    for key, value in settings.options.items():
+        if key not in known:
+            raise SettingsError(
+                f"unknown option {key!r} of {settings.method}; known: {', '.join(known)}", path=("estimate", "options", key)
+            )
+        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+            raise SettingsError(f"{value!r}; expected a positive number", path=("estimate", "options", key))
+    return settings.options
+
+
+def raw_factor(observation: Observation, settings: EstimateSettings) -> Factor:
+    """Factor of [W Y] on the columns that `settings` asks for."""
+    full = factor(observation.W, observation.Y, observation.rows, observation.names)
+    if settings.columns == "all":
+        return full
+    unknown = [name for name in settings.columns if name not in observation.names]
+    if unknown:
+        message = f"no parameter {', '.join(unknown)}; the model has {', '.join(observation.names)}"
+        raise SettingsError(message, path=("estimate", "columns"))
+    return full.select(settings.columns)
+
+
+def standard_deviations(system: System, fit: Solution) -> tuple[float, Array]:
+    """sigma_rho of eq. (9), and C of eq. (10) with shape (b, b); nan where the record says nothing."""
+    freedom = system.weighted.rows - fit.rank
+    sigma_rho = fit.residual_norm / np.sqrt(freedom) if freedom > 0 else np.nan
+    C = fit.T @ fit.T.T * (1.0 if system.known_variance else sigma_rho**2)
+    lost = _undetermined(system, fit)
+    C[lost], C[:, lost] = np.nan, np.nan
+    return float(sigma_rho), C
+
+
+def assemble(
+    system: System, fit: Solution, *, model: GeneratedModel | None = None, provenance: Mapping[str, Any] | None = None
+) -> Estimate:
+    """The Estimate of a solved system; `model` gives units, joint numbers and the hash of the robot."""
+    observation, names = system.observation, system.names
+    columns = [observation.names.index(name) for name in names]
+    W = observation.W if names == observation.names else observation.W[:, columns]
+    residual = observation.Y - W @ fit.X
+    sigma_rho, C = standard_deviations(system, fit)
+    block = float(system.options.get("block", default_block(observation)))
+    if system.whitener is None:
+        weights = np.repeat(1 / np.square(system.scales), observation.rows)
+        C_b = block_covariance(W, residual * weights, block_of_rows(observation, block), fit.T)
+    else:
+        whole = whitened(np.column_stack([W, residual]), system.whitener)
+        C_b = block_covariance(whole[:, :-1], whole[:, -1], block_of_rows(observation, block), fit.T)
+    corrected = np.sqrt(np.diag(C_b))
+    corrected[_undetermined(system, fit)] = np.nan
+    norms = [joint.residual_norm(fit.X) for joint in system.raw.joints]
+    measured = [joint.measured_norm for joint in system.raw.joints]
+    labels = [str(j) for j in (model.JOINTS if model is not None else range(1, observation.n + 1))]
+    share = 1 - fit.rank / system.raw.rows
+    per_joint = tuple(
+        JointFit(
+            label, joint.rows, norm, _percent(norm, of), norm / np.sqrt(joint.rows * share) if share > 0 and joint.rows else np.nan, scale
+        )
+        for label, joint, norm, of, scale in zip(labels, system.raw.joints, norms, measured, system.scales, strict=True)
+    )
+    total = float(np.linalg.norm(norms))
+    status, message = outcome(system, fit)
+    return Estimate(
+        names=names,
+        X=fit.X,
+        sigma=np.sqrt(np.diag(C)),
+        covariance=C,
+        sigma_corrected=corrected,
+        sigma_rho=sigma_rho,
+        cond=fit.cond,
+        cond_unit=fit.cond_unit,
+        rank=fit.rank,
+        residual_norm=total,
+        relative_error=_percent(total, float(np.linalg.norm(measured))),
+        per_joint=per_joint,
+        method=system.settings.method,
+        status=status,
+        message=message,
+        groups=fit.groups,
+        iterations=system.iterations,
+        settings={**observation.settings, "estimate": to_mapping(system.settings), "residual_block": block},
+        provenance={**describe(observation, model), **(provenance or {})},
+        units=dict(getattr(model, "UNITS", {})),
+    )
+
+
+def outcome(system: System, fit: Solution) -> tuple[str, str]:
+    """Status and the paragraph that explains it."""
+    b = len(system.names)
+    if fit.rank < b:
+        silent = [group[0] for group in fit.groups if len(group) == 1]
+        mixed = ["(" + ", ".join(group) + ")" for group in fit.groups if len(group) > 1]
+        parts = [f"The {system.weighted.rows} rows of this record have rank {fit.rank} for {b} parameters (unit columns)."]
+        if silent:
+            parts.append(f"No effect on these rows: {', '.join(silent)}.")
+        if mixed:
+            parts.append(
+                f"Cannot be told apart: {'; '.join(mixed)}; the values given are those of least norm and only their joint effect is meant."
+            )
+        parts.append(
+            "Likely causes: a motion that does not excite them (a joint at rest, one configuration, constant velocity), or columns that are not base "
+            "parameters of this robot. Use a richer motion, or leave names out with estimate.columns until one of each group is gone."
+        )
+        return "rank-deficient", " ".join(parts)
+    if system.weighted.rows <= b:
+        return "no-redundancy", (
+            f"{system.weighted.rows} rows for {b} parameters: the fit is exact whatever the noise and no uncertainty can be stated. "
+            "Use a longer record or a smaller decimation factor."
+        )
+    return system.status, system.message
+
+
+def whitened(A: Array, whitener: Array) -> Array:
+    """A, shape (n*N, c) joint-major, with the n rows of each instant multiplied by `whitener`, shape (n, n)."""
+    n = len(whitener)
+    return np.asarray(np.einsum("ij,jNc->iNc", whitener, A.reshape(n, -1, A.shape[1])).reshape(A.shape))
+
+
+def describe(observation: Observation, model: GeneratedModel | None = None) -> dict[str, Any]:
+    """Provenance: hashes of the robot file and of the measured files, versions that computed."""
+    try:
+        own = version("symgen")
+    except PackageNotFoundError:
+        own = "not installed"
+    robot = {} if model is None else {"robot": model.NAME, "robot_sha256": model.SOURCE_SHA256}
+    return {**robot, "files": dict(observation.files), "versions": {"symgen": own, "numpy": np.__version__, "scipy": scipy.__version__}}
+
+
+def _undetermined(system: System, fit: Solution) -> list[int]:
+    return [system.names.index(name) for group in fit.groups for name in group]
+
+
+def _percent(norm: float, of: float) -> float:
+    return 100 * norm / of if of > 0 else float("nan")

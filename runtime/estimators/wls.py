@@ -1,0 +1,112 @@
+"""Least squares weighted by joint: rows of joint j divided by s_j, the deviation of its residuals in N m.
+
+    X = argmin sum_j ||Y_j - W_j X||^2 / s_j^2,    C = (sum_j W_j'W_j / s_j^2)^-1
+
+`weights` says where s_j comes from:
+
+    joint       (default) s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j), X_j the least squares of joint j alone, b_j = rank W_j. Exactly invariant
+                under scaling of Y and W of one joint.
+    iterated    s_j^2 = ||Y_j - W_j X||^2 / (N_j (1 - b/r)) from the common solution, repeated until every s_j changes by less than 1e-3.
+    covariance  residuals E, shape (n, N), of ordinary least squares; Omega = E E'/(N - b/n); the n rows of one instant times L^-1, L L' = Omega.
+
+The chapter leaves weights open; Gautier (1997) and BIRDy use the first and the last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import LinAlgError, cholesky, solve_triangular
+
+from runtime.errors import SettingsError
+from runtime.estimators.linear import OPTIONS, System, checked_options, raw_factor, whitened
+from runtime.estimators.solution import joint_scatter, solve
+from runtime.estimators.triangular import Factor, factor
+from runtime.observation import Observation
+from runtime.study import EstimateSettings
+
+CONVERGED = 1e-3
+"""Relative change of every s_j at which iterated weights have converged."""
+PASSES = 50
+"""Largest number of passes of iterated weights; option `passes`."""
+
+
+def system(observation: Observation, settings: EstimateSettings) -> System:
+    """The rows weighted as `settings.weights` asks; "none" means "joint", as the method has been named."""
+    checked_options(settings, (*OPTIONS, "passes"))
+    raw = raw_factor(observation, settings)
+    if settings.weights == "covariance":
+        return _covariance(observation, settings, raw)
+    start = _by_joint(observation, settings, raw)
+    return _iterated(start) if settings.weights == "iterated" else start
+
+
+def _by_joint(observation: Observation, settings: EstimateSettings, raw: Factor) -> System:
+    scales = _first_scales(raw, settings.options.get("rank_tolerance"))
+    weighted = raw.weighted(1 / scales)
+    return System(observation, settings, raw, weighted, tuple(scales.tolist()), known_variance=True, options=settings.options)
+
+
+def _first_scales(raw: Factor, tolerance: float | None) -> np.ndarray:
+    """s_j from joint j alone; from the common ordinary least squares where joint j has too few rows. Never zero."""
+    common = _common_scales(raw, solve(raw, tolerance).X, tolerance)
+    own = joint_scatter(raw, tolerance)
+    return _floored(raw, np.array([c if s is None else s for s, c in zip(own, common, strict=True)]))
+
+
+def _common_scales(raw: Factor, X: np.ndarray, tolerance: float | None) -> np.ndarray:
+    """s_j, shape (n,), of the residuals of X: each joint carries its share b N_j/r of the lost degrees of freedom."""
+    rank = solve(raw, tolerance).rank
+    share = max(1 - rank / raw.rows, 1 / raw.rows)
+    return np.array([joint.residual_norm(X) / np.sqrt(max(joint.rows, 1) * share) for joint in raw.joints])
+
+
+def _floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
+    """Scales not below the rounding of Y_j: an exact fit of a joint must not weigh infinitely."""
+    rounding = [np.finfo(float).eps * joint.measured_norm / np.sqrt(max(joint.rows, 1)) for joint in raw.joints]
+    floored = np.maximum(scales, rounding)
+    smallest = floored[floored > 0].min(initial=np.inf)
+    return np.where(floored > 0, floored, smallest if np.isfinite(smallest) else 1.0)
+
+
+def _iterated(start: System) -> System:
+    raw, tolerance = start.raw, start.options.get("rank_tolerance")
+    limit = int(start.options.get("passes", PASSES))
+    scales, change, done = np.array(start.scales), np.inf, 0
+    while change >= CONVERGED and done < limit:
+        new = _floored(raw, _common_scales(raw, solve(raw.weighted(1 / scales), tolerance).X, tolerance))
+        change = float(np.max(np.abs(new / scales - 1)))
+        scales, done = new, done + 1
+    status, message = "ok", ""
+    if change >= CONVERGED:
+        status = "not-converged"
+        message = (
+            f"The weights of the joints still change by {change:.1e} after {limit} passes (limit {CONVERGED}). "
+            "Raise estimate.options.passes, or use weights: joint, which needs none."
+        )
+    weighted = raw.weighted(1 / scales)
+    return replace(start, weighted=weighted, scales=tuple(scales.tolist()), iterations=done, status=status, message=message)
+
+
+def _covariance(observation: Observation, settings: EstimateSettings, raw: Factor) -> System:
+    n, N = observation.n, observation.rows[0]
+    same = set(observation.rows) == {N} and all(np.array_equal(observation.t[:N], observation.t[observation.joint(j)]) for j in range(n))
+    if not same:
+        counts = ", ".join(map(str, observation.rows))
+        message = f"covariance needs every joint at every instant; rows per joint are {counts}. Use weights: joint, or rows.low_speed: 0"
+        raise SettingsError(message, path=("estimate", "weights"))
+    columns = [observation.names.index(name) for name in raw.names]
+    W = observation.W[:, columns]
+    fit = solve(raw, settings.options.get("rank_tolerance"))
+    E = (observation.Y - W @ fit.X).reshape(n, N)
+    Omega = E @ E.T / max(N - fit.rank / n, 1)
+    try:
+        whitener = solve_triangular(cholesky(Omega, lower=True), np.eye(n), lower=True)
+    except LinAlgError:
+        message = "The residuals of the joints are linearly dependent (an exact fit, or fewer instants than joints); weights by joint were used instead."
+        return replace(_by_joint(observation, settings, raw), status="singular-weights", message=message)
+    whole = whitened(np.column_stack([W, observation.Y]), whitener)
+    weighted = factor(whole[:, :-1], whole[:, -1], observation.rows, raw.names)
+    scales = tuple(np.sqrt(np.diag(Omega)).tolist())
+    return System(observation, settings, raw, weighted, scales, whitener, known_variance=True, options=settings.options)
