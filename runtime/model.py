@@ -11,6 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from runtime.errors import InputError
+
 Array = np.ndarray
 
 
@@ -35,3 +37,16 @@ class GeneratedModel(Protocol):
 
     def observation_matrix(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
         """W, shape (n*N, b), rows joint-major, Fortran order, eq. (6)."""
+
+
+def check_states(model: GeneratedModel, q: Array, qd: Array, qdd: Array) -> None:
+    """Raise ValueError unless q, qd, qdd are real arrays of one shape (N, n), n the joints of the model."""
+    n = len(model.JOINTS)
+    for name, x in (("q", q), ("qd", qd), ("qdd", qdd)):
+        x = np.asarray(x)
+        if x.ndim not in (1, 2) or x.shape[-1] != n or x.shape != np.shape(q):
+            raise InputError(
+                f"{model.NAME}: {name} has shape {x.shape}, q {np.shape(q)}; expected (N, {n}) or ({n},), the same for q, qd and qdd"
+            )
+        if not np.issubdtype(x.dtype, np.floating) and not np.issubdtype(x.dtype, np.integer):
+            raise InputError(f"{model.NAME}: {name} has dtype {x.dtype}; expected real numbers")

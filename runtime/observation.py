@@ -1,12 +1,30 @@
-"""The observed linear system Y = W X + rho, eqs. (6) and (14)."""
+"""From a record to the observed linear system Y = W X + rho, eqs. (6) and (14).
+
+    observe(model, record, study)                    the whole way, or its steps:
+    filtered_states(q, rate, signals)                q, qd, qdd
+    select_rows(record, qd, study)                   window, decimated instants, rows left out
+    decimated_torque(tau, selection)                 Y, shape (n, K)
+    observation_from_states(model, states, torque, selection)
+
+A study that perturbs the positions (CESTAC) calls `select_rows` and `decimated_torque` once, on the measured record, and repeats
+`filtered_states` and `observation_from_states` with perturbed positions: Y and the choice of rows stay those of the record, so that a row is
+never kept or dropped because of noise.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+
+from runtime.columns import decimated_columns
+from runtime.errors import InputError
+from runtime.model import GeneratedModel, check_states
+from runtime.record import Record
+from runtime.signals import States, decimated, decimation_factor, filtered_states, kept_samples, median_filtered
+from runtime.study import Rows, Signals, Study, to_mapping
 
 Array = np.ndarray
 
@@ -37,12 +55,217 @@ class Observation:
     settings: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        r = sum(self.rows)
+        if self.W.shape != (r, len(self.names)) or self.Y.shape != (r,) or self.t.shape != (r,) or self.record.shape != (r,):
+            shapes = f"W {self.W.shape}, Y {self.Y.shape}, t {self.t.shape}, record {self.record.shape}"
+            raise InputError(f"{shapes}; expected {r} rows, the sum of {self.rows}, and {len(self.names)} columns")
+
     @property
     def n(self) -> int:
         """Number of joints."""
         return len(self.rows)
 
+    @property
+    def joints(self) -> Array:
+        """Joint of each row, from 0, shape (r,)."""
+        return np.repeat(np.arange(self.n), self.rows)
+
     def joint(self, j: int) -> slice:
         """Rows of the j-th joint, j from 0."""
         start = sum(self.rows[:j])
         return slice(start, start + self.rows[j])
+
+    def columns(self, names: Sequence[str]) -> Observation:
+        """The same rows with the named columns alone, in the order given."""
+        unknown = [name for name in names if name not in self.names]
+        if unknown:
+            raise InputError(f"no column {', '.join(unknown)}; there are {', '.join(self.names)}")
+        return replace(self, W=np.asfortranarray(self.W[:, [self.names.index(name) for name in names]]), names=tuple(names))
+
+    def where(self, mask: Array) -> Observation:
+        """The rows where `mask`, bool of shape (r,), is true."""
+        if mask.shape != self.Y.shape or mask.dtype != np.bool_:
+            raise InputError(f"mask {mask.dtype} {mask.shape}; expected bool {self.Y.shape}")
+        rows = tuple(int(np.count_nonzero(mask[self.joint(j)])) for j in range(self.n))
+        return replace(self, W=np.asfortranarray(self.W[mask]), Y=self.Y[mask], t=self.t[mask], record=self.record[mask], rows=rows)
+
+    def between(self, t0: float | None, t1: float | None) -> Observation:
+        """The rows with t0 <= t <= t1, s; None leaves an end open."""
+        inside = np.ones(len(self.t), dtype=bool)
+        if t0 is not None:
+            inside &= self.t >= t0
+        if t1 is not None:
+            inside &= self.t <= t1
+        if not inside.any():
+            raise InputError(f"no row in [{t0}, {t1}] s; the rows lie in [{self.t.min():g}, {self.t.max():g}] s")
+        return self.where(inside)
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Which samples are evaluated and which decimated rows are kept; shared by every run of a study.
+
+    samples : the window, in raw samples.   kept : shape (K,), kept instants, from the start of the window.   mask : bool (n, K), rows used.
+    """
+
+    samples: slice
+    kept: Array
+    mask: Array
+    factor: int
+    t: Array
+    rate: float
+    signals: Signals
+    rows: Rows
+    dropped: Mapping[str, tuple[int, ...]]
+
+
+def observe(
+    model: GeneratedModel, record: Record, study: Study, *, keep: Array | None = None, constants: Mapping[str, float] | None = None
+) -> Observation:
+    """Filter, differentiate, evaluate the regressor, decimate, and leave rows out.
+
+    keep : bool, shape (N,) or (N, n): samples (and joints) that may be used, e.g. from a simulated velocity.
+    constants : values in place of the robot file's, for the model's keyword arguments.
+    """
+    states = filtered_states(record.q, record.rate, study.signals)
+    selection = select_rows(record, states.qd, study.signals, study.rows, keep=keep)
+    torque = decimated_torque(record.tau, selection)
+    return observation_from_states(model, states, torque, selection, files=record.files, constants=constants)
+
+
+def select_rows(record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None) -> Selection:
+    """Window, decimated instants, and the rows left out by trim, low speed and `keep`; qd, shape (N, n), are the filtered velocities."""
+    samples = _window(record, rows)
+    factor = decimation_factor(signals, record.rate)
+    N = samples.stop - samples.start
+    kept = kept_samples(N, factor, signals.decimate.phase if signals.decimate else "first")
+    instants = kept + samples.start
+    if len(kept) <= 2 * rows.trim:
+        raise InputError(
+            f"{len(kept)} rows per joint after decimation by {factor}, of which rows.trim leaves out {2 * rows.trim}", file=record.name
+        )
+    mask = np.ones((record.n, len(kept)), dtype=bool)
+    dropped = {}
+    for reason, usable in (
+        ("trim", _untrimmed(len(kept), rows.trim)),
+        ("low_speed", np.abs(qd[instants].T) >= _per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None]),
+        ("mask", True if keep is None else _keep(keep, record)[instants].T),
+    ):
+        before = mask.sum(axis=1)
+        mask &= usable
+        dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
+    if not mask.any():
+        raise InputError(f"no row is left: {dropped} rows per joint were left out of {len(kept)}", file=record.name)
+    return Selection(samples, kept, mask, factor, record.t[instants], record.rate / factor, signals, rows, dropped)
+
+
+def decimated_torque(tau: Array, selection: Selection) -> Array:
+    """Y before rows are left out, shape (n, K), of measured joint torques tau, shape (N, n): median filter, window, decimation."""
+    windowed = median_filtered(tau, selection.signals.median)[selection.samples]
+    return decimated(np.ascontiguousarray(windowed.T), selection.factor, selection.signals.decimate)
+
+
+def observation_from_states(
+    model: GeneratedModel,
+    states: States,
+    torque: Array,
+    selection: Selection,
+    *,
+    files: Mapping[str, str] | None = None,
+    constants: Mapping[str, float] | None = None,
+) -> Observation:
+    """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated before."""
+    check_states(model, states.q, states.qd, states.qdd)
+    n, K = selection.mask.shape
+    if torque.shape != (n, K) or len(model.JOINTS) != n:
+        raise InputError(f"torque {torque.shape}, model {model.NAME} with {len(model.JOINTS)} joints; expected {(n, K)} and {n} joints")
+    columns = decimated_columns(model, states[selection.samples], selection.factor, selection.signals.decimate, constants or {})
+    mask = selection.mask.ravel()
+    settings = {"signals": to_mapping(selection.signals), "rows": to_mapping(selection.rows), "factor": selection.factor}
+    return Observation(
+        W=np.compress(mask, columns.reshape(len(columns), n * K), axis=1).T,
+        Y=torque.ravel()[mask],
+        rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
+        names=tuple(model.BASE_PARAMETERS),
+        t=np.tile(selection.t, n)[mask],
+        record=np.zeros(int(mask.sum()), dtype=int),
+        rate=selection.rate,
+        dropped=selection.dropped,
+        settings=settings,
+        files=dict(files or {}),
+    )
+
+
+def stack(observations: Sequence[Observation]) -> Observation:
+    """Several records of one robot as one system, joint-major; `record` tells the rows apart."""
+    if not observations:
+        raise InputError("no observation to stack")
+    first = observations[0]
+    for o in observations[1:]:
+        if o.names != first.names or o.n != first.n:
+            raise InputError(f"columns {o.names} on {o.n} joints; expected those of the first record, {first.names} on {first.n} joints")
+    offsets = np.cumsum([0] + [int(o.record.max(initial=-1)) + 1 for o in observations])
+    order = [(o, o.joint(j), k) for j in range(first.n) for o, k in zip(observations, offsets, strict=False)]
+    W = np.empty((sum(sum(o.rows) for o in observations), len(first.names)), order="F")
+    np.concatenate([o.W[rows] for o, rows, _ in order], out=W)
+    return Observation(
+        W=W,
+        Y=np.concatenate([o.Y[rows] for o, rows, _ in order]),
+        rows=tuple(sum(o.rows[j] for o in observations) for j in range(first.n)),
+        names=first.names,
+        t=np.concatenate([o.t[rows] for o, rows, _ in order]),
+        record=np.concatenate([o.record[rows] + k for o, rows, k in order]),
+        rate=first.rate,
+        dropped={
+            reason: tuple(sum(o.dropped.get(reason, (0,) * first.n)[j] for o in observations) for j in range(first.n))
+            for reason in first.dropped
+        },
+        settings=first.settings
+        if all(o.settings == first.settings for o in observations)
+        else {"records": [o.settings for o in observations]},
+        files={name: value for o in observations for name, value in o.files.items()},
+    )
+
+
+def _window(record: Record, rows: Rows) -> slice:
+    """Raw samples with t0 <= t <= t1."""
+    t0, t1 = rows.window
+    start = 0 if t0 is None else int(np.searchsorted(record.t, t0, side="left"))
+    stop = len(record) if t1 is None else int(np.searchsorted(record.t, t1, side="right"))
+    if stop <= start:
+        raise InputError(
+            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{record.t[0]:g}, {record.t[-1]:g}] s", file=record.name
+        )
+    return slice(start, stop)
+
+
+def _untrimmed(K: int, trim: int) -> Array:
+    inside = np.arange(K)
+    return (inside >= trim) & (inside < K - trim)
+
+
+def _keep(keep: Array, record: Record) -> Array:
+    keep = keep[:, None] if keep.ndim == 1 else keep
+    if keep.dtype != np.bool_ or keep.shape not in {(len(record), 1), (len(record), record.n)}:
+        raise InputError(f"keep {keep.dtype} {keep.shape}; expected bool {(len(record),)} or {(len(record), record.n)}", file=record.name)
+    return keep
+
+
+def _per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
+    values = np.atleast_1d(np.asarray(value, dtype=float))
+    if values.shape not in {(1,), (n,)}:
+        raise InputError(f"{name} has {len(values)} values; expected one or {n}, one per joint")
+    return np.broadcast_to(values, (n,))
+
+
+__all__ = [
+    "Observation",
+    "Selection",
+    "decimated_torque",
+    "filtered_states",
+    "observation_from_states",
+    "observe",
+    "select_rows",
+    "stack",
+]

@@ -1,0 +1,79 @@
+"""The columns of W, decimated: only the entries of the regressor that are not identically zero, and equal ones once.
+
+Most entries of W are structurally zero or repeat each other up to the sign (TX40: 135 signals of 360 entries), and decimation is linear: filter
+the signals, then place them. The regressor is evaluated in blocks on one reused store, so that memory is that of the signals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.model import GeneratedModel
+from runtime.signals import States, decimated
+from runtime.study import Decimate
+
+Array = np.ndarray
+
+BLOCK = 4096  # samples: rows of 32 kB, which stay in cache
+PROBES = 64  # random states that tell signals apart
+
+
+@dataclass(frozen=True, eq=False)
+class Entries:
+    """Where the signals stand: store[k[m], j[m]] = sign[m] * signal[which[m]]; signal s is first met at entry source[s]."""
+
+    k: Array
+    j: Array
+    which: Array
+    sign: Array
+    source: Array
+
+
+def decimated_columns(
+    model: GeneratedModel, states: States, factor: int, settings: Decimate | None, constants: Mapping[str, float]
+) -> Array:
+    """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of the window."""
+    entries = distinct_entries(model, constants)
+    signals = decimated(signals_of(model, states, entries, constants), factor, settings)
+    store = np.zeros((*np.shape(model.STRUCTURE), signals.shape[-1]))
+    store[entries.k, entries.j] = entries.sign[:, None] * signals[entries.which]
+    return store
+
+
+def signals_of(model: GeneratedModel, states: States, entries: Entries, constants: Mapping[str, float]) -> Array:
+    """The distinct signals of the regressor, shape (S, N)."""
+    k, j = entries.k[entries.source], entries.j[entries.source]
+    N = len(states)
+    signals = np.empty((len(k), N))
+    size = N if N <= 2 * BLOCK else BLOCK
+    out = model.store(size)
+    for t0 in range(0, N, size):
+        block = states[t0 : t0 + size]
+        if len(block) < size:
+            out = model.store(len(block))
+        D = model.regressor(block.q, block.qd, block.qdd, out=out, **constants)
+        signals[:, t0 : t0 + size] = D.transpose(2, 1, 0)[k, j]
+    return signals
+
+
+def distinct_entries(model: GeneratedModel, constants: Mapping[str, float]) -> Entries:
+    """Entries of STRUCTURE grouped by equal values, up to the sign, at random states.
+
+    The emitted text copies equal rows, so equal signals agree in every bit; different ones do not agree at 64 random states. Where the random
+    states are out of reach (loops that do not close), every entry stands for itself.
+    """
+    k, j = np.nonzero(np.asarray(model.STRUCTURE))
+    rng = np.random.default_rng(0)
+    q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))
+    with np.errstate(all="ignore"):
+        values = model.regressor(q, qd, qdd, out=model.store(PROBES), **constants).transpose(2, 1, 0)[k, j]
+    if not np.isfinite(values).all():
+        every = np.arange(len(k))
+        return Entries(k, j, every, np.ones(len(k)), every)
+    sign = np.where(values[:, 0] < 0, -1.0, 1.0)
+    _, source, which = np.unique(sign[:, None] * values + 0.0, axis=0, return_index=True, return_inverse=True)
+    which = which.reshape(-1)
+    return Entries(k, j, which, sign * sign[source][which], source)
