@@ -1,0 +1,286 @@
+"""Dynamics from energies, differentiated by CasADi: an independent oracle that shares nothing with the Newton-Euler recursions.
+
+With T_j(q) the pose of frame j in frame 0 (4 x 4) and Sigma_j the pseudo-inertia of link j about the origin of its frame,
+
+    E = sum_j 1/2 tr(Tdot_j Sigma_j Tdot_j')       Sigma = | tr(J)/2 E3 - J   MS |       J  = [XX XY XZ; XY YY YZ; XZ YZ ZZ]
+    U = - sum_j (g', 0) T_j Sigma_j e4                     |      MS'          M |       MS = [MX MY MZ]'
+
+both linear in the standard parameters chi. Elements with parameter c along s = G q, or of form B, add
+
+    E += c/2 sd**2 | c/2 qd' B qd (inertia)        U += c s (offset),  c/2 s**2 | c/2 q' B q (stiffness)
+    Q  = c G' sd | c B qd (viscous),  c G' sign(sd) (coulomb); `when: positive` keeps max(., 0) of sd or sign(sd), negative min(., 0)
+
+and Gamma = d/dt dE/dqd - dE/dq + dU/dq + Q. Coordinates are all joints that move, the cut and passive ones included (the
+open tree). A mechanism with loops is the tree restricted to q = f(qa), where phi(q) = 0 closes the loops:
+
+    Gamma_a = G' Gamma_tree,   G = dq/dqa,   qd = G qad,   qdd = G qadd + Gdot qad .
+
+`check` and the tests import this module; nothing else does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symgen.description.expression import Expression
+from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Robot, parameter
+
+Array = np.ndarray[Any, Any]
+NEWTON_STEPS, NEWTON_STEP, CLOSED = 50, 0.5, 1e-11  # iterations, rad or m per iteration, defect of a closed loop
+DRAWS = 20  # attempts to find states in which the loops close
+SX = Any  # casadi.SX
+
+
+def pose(frame: Frame, q: SX, constants: Mapping[str, float]) -> SX:
+    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), i = ant(j); 4 x 4."""
+    gamma, b, alpha, d, theta, r = (e.value(constants) for e in (frame.gamma, frame.b, frame.alpha, frame.d, frame.theta0, frame.r0))
+    theta = theta + q if frame.sigma == REVOLUTE else theta
+    r = r + q if frame.sigma == PRISMATIC else r
+    return _screw(2, gamma, b) @ _screw(0, alpha, d) @ _screw(2, theta, r)
+
+
+def _screw(axis: int, angle: SX, shift: SX) -> SX:
+    """Rotation about x (axis 0) or z (axis 2) and translation along it, 4 x 4."""
+    T = ca.SX.eye(4)
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    T[u, u], T[u, v], T[v, u], T[v, v] = ca.cos(angle), -ca.sin(angle), ca.sin(angle), ca.cos(angle)
+    T[axis, 3] = shift
+    return T
+
+
+def poses(robot: Robot, q: Mapping[int, SX], constants: Mapping[str, float]) -> dict[int, SX]:
+    """0Tj of every frame, by frame number; q by joint number."""
+    T = {0: ca.SX.eye(4)}
+    for f in robot.frames:
+        T[f.j] = T[f.ant] @ pose(f, q.get(f.j, 0), constants)
+    return T
+
+
+def pseudo_inertia(name: str) -> Array:
+    """Sigma of a link whose only nonzero standard parameter is `name` = 1."""
+    S = np.zeros((4, 4))
+    if name == "M":
+        S[3, 3] = 1
+    elif name.startswith("M"):
+        k = "XYZ".index(name[1])
+        S[k, 3] = S[3, k] = 1
+    else:
+        k, l = ("XYZ".index(c) for c in name)
+        J = np.zeros((3, 3))
+        J[k, l] = J[l, k] = 1
+        S[:3, :3] = np.trace(J) / 2 * np.eye(3) - J
+    return S
+
+
+def _energies(robot: Robot, T: Mapping[int, SX], q: SX, qd: SX, constants: Mapping[str, float]) -> tuple[SX, SX, SX]:
+    """Kinetic and potential energy per unit of each standard parameter, (p,), and generalised force Q, (n, p)."""
+    n, p = len(robot.moving), len(robot.parameters)
+    column = {name: k for k, name in enumerate(robot.parameters)}
+    E, U, Q = ca.SX.zeros(p), ca.SX.zeros(p), ca.SX.zeros(n, p)
+    g = ca.DM([e.value(constants) for e in robot.gravity] + [0])
+    for j in robot.links:
+        Td = ca.jtimes(T[j], q, qd)
+        K = Td.T @ Td
+        for name in INERTIAL:
+            S = ca.DM(pseudo_inertia(name))
+            k = column[parameter(name, j)]
+            E[k] = ca.sum1(ca.sum2(K * S)) / 2  # tr(Td S Td') = <Td' Td, S>
+            U[k] = -g.T @ T[j] @ S[:, 3]
+    for e in robot.elements:
+        for j in e.keys:
+            k = column[parameter(e.family, j)]
+            E[k], U[k], Q[:, k] = _element(robot, e, j, q, qd, constants)
+    return E, U, Q
+
+
+def _element(robot: Robot, e: Element, j: int, q: SX, qd: SX, constants: Mapping[str, float]) -> tuple[SX, SX, SX]:
+    """Kinetic and potential energy and generalised force of an element's key j for parameter 1."""
+
+    def number(x: Expression) -> float:
+        return x.value(constants)
+
+    index = {i: k for k, i in enumerate(robot.moving)}
+    B = np.zeros((len(index), len(index)))
+    for (i, l), x in e.form.get(j, {}).items():
+        B[index[i], index[l]] = number(x)
+    G = np.zeros((1, len(index)))
+    for i, x in e.along.get(j, {}).items():
+        G[0, index[i]] = number(x)
+    if j in e.along:
+        B = G.T @ G
+    zero = ca.SX.zeros(len(index))
+    if e.kind == "inertia":
+        return qd.T @ B @ qd / 2, 0, zero
+    if e.kind == "stiffness":
+        return 0, q.T @ B @ q / 2, zero
+    if e.kind == "offset":
+        return 0, G @ q, zero
+    sd = G @ qd
+    motion = {None: 1, "positive": sd > 0, "negative": sd < 0}[e.when]
+    force = B @ qd if e.kind == "viscous" else G.T @ ca.sign(sd)
+    return 0, 0, force * motion
+
+
+def _floats(function: Any, *arguments: Array) -> Array:
+    """A CasADi function of column vectors on samples: arguments (..., m_k), result (..., rows, columns)."""
+    shape = np.broadcast_shapes(*(np.shape(a)[:-1] for a in arguments))
+    columns = [np.broadcast_to(a, (*shape, np.shape(a)[-1])).reshape(-1, np.shape(a)[-1]).T for a in arguments]
+    N = columns[0].shape[1]
+    rows, width = function.size_out(0)
+    out = np.asarray(function.map(N)(*columns).full())  # (rows, width*N)
+    return out.reshape(rows, N, width).transpose(1, 0, 2).reshape(*shape, rows, width)
+
+
+class Lagrange:
+    """Dynamics of the open tree of a robot in all its moving joints (order `robot.moving`), geometry in floats.
+
+    Every method takes q, qd, qdd of shape (..., n) and returns the same leading axes. chi is (p,) in the order of
+    `robot.parameters`, or (..., p).
+    """
+
+    def __init__(self, robot: Robot, constants: Mapping[str, float] | None = None) -> None:
+        self.robot, self.names = robot, robot.parameters
+        self.constants = {**robot.constants, **(constants or {})}
+        n, p = len(robot.moving), len(robot.parameters)
+        q, qd, qdd, chi = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("qdd", n), ca.SX.sym("chi", p)
+        T = poses(robot, {j: q[k] for k, j in enumerate(robot.moving)}, self.constants)
+        kinetic, potential, friction = _energies(robot, T, q, qd, self.constants)
+        E, U = ca.dot(kinetic, chi), ca.dot(potential, chi)
+        momentum = ca.gradient(E, qd)
+        rate = ca.jtimes(momentum, ca.vertcat(q, qd), ca.vertcat(qd, qdd))
+        gamma = rate - ca.gradient(E, q) + ca.gradient(U, q) + friction @ chi
+        self._gamma = ca.Function("gamma", [q, qd, qdd, chi], [gamma])
+        self._regressor = ca.Function("regressor", [q, qd, qdd], [ca.densify(ca.jacobian(gamma, chi))])
+        self._inertia = ca.Function("inertia", [q, chi], [ca.densify(ca.jacobian(momentum, qd))])
+        self._gravity = ca.Function("gravity", [q, chi], [ca.densify(ca.gradient(U, q))])
+        self._poses = ca.Function("poses", [q], [ca.densify(ca.horzcat(*(T[f.j] for f in robot.frames)))])
+        self._jacobians = ca.Function("jacobians", [q], [ca.densify(ca.horzcat(*(_jacobian(T[f.j], q) for f in robot.frames)))])
+        phi = _closure(robot, T, q, self.constants)
+        self._loop = ca.Function("loop", [q], [phi])
+        self._loop_jacobian = ca.Function("loop_jacobian", [q], [ca.densify(ca.jacobian(phi, q))])
+        self._loop_rate = ca.Function("loop_rate", [q, qd], [ca.densify(ca.jtimes(ca.jtimes(phi, q, qd), q, qd))])
+        self._start = _start(robot, q, self.constants)
+
+    def torque(self, q: Array, qd: Array, qdd: Array, chi: Array) -> Array:
+        """Gamma, (..., n)."""
+        return _floats(self._gamma, q, qd, qdd, chi)[..., 0]
+
+    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """D with Gamma = D chi, (..., n, p)."""
+        return _floats(self._regressor, q, qd, qdd)
+
+    def inertia_matrix(self, q: Array, chi: Array) -> Array:
+        """A = d2E/dqd2, (..., n, n)."""
+        return _floats(self._inertia, q, chi)
+
+    def gravity(self, q: Array, chi: Array) -> Array:
+        """dU/dq, (..., n): Gamma at rest without friction; gravity, offsets and springs."""
+        return _floats(self._gravity, q, chi)[..., 0]
+
+    def poses(self, q: Array) -> Array:
+        """0Tj of every frame in file order, (..., frames, 4, 4)."""
+        T = _floats(self._poses, q)
+        return np.moveaxis(T.reshape(*T.shape[:-1], -1, 4), -2, -3)
+
+    def jacobian(self, q: Array, frame: int | None = None) -> Array:
+        """Velocity of the origin, then angular velocity, of `frame` (default: the last) in frame 0 per qd, (..., 6, n)."""
+        J = _floats(self._jacobians, q)
+        n, j = len(self.robot.moving), frame or self.robot.frames[-1].j
+        return J[..., (j - 1) * n : j * n]
+
+    def motion(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
+        """Tree motion q, qd, qdd (..., n) and G = dq/dqa (..., n, n_a) of the actuated q, qd, qdd (..., n_a).
+
+        Loops are closed by Newton's method from the constraints, or from `start`; a state that it cannot close is NaN.
+        """
+        actuated = [self.robot.moving.index(j) for j in self.robot.joints]
+        passive = [self.robot.moving.index(j) for j in self.robot.passive]
+        x = _floats(self._start, q)[..., 0]
+        G = np.zeros((*x.shape, len(actuated)))
+        G[..., actuated, :] = np.eye(len(actuated))
+        if not passive:
+            return x, np.asarray(qd), np.asarray(qdd), G
+        for _ in range(NEWTON_STEPS):
+            step = np.linalg.pinv(_floats(self._loop_jacobian, x)[..., passive]) @ _floats(self._loop, x)
+            x[..., passive] -= np.clip(step[..., 0], -NEWTON_STEP, NEWTON_STEP)
+        J = _floats(self._loop_jacobian, x)
+        inverse = np.linalg.pinv(J[..., passive])
+        G[..., passive, :] = -inverse @ J[..., actuated]
+        xd = (G @ np.asarray(qd)[..., None])[..., 0]
+        xdd = (G @ np.asarray(qdd)[..., None])[..., 0]
+        xdd[..., passive] -= (inverse @ _floats(self._loop_rate, x, xd))[..., 0]  # Jp qddp + Ja qdda + Jdot qd = 0
+        x[np.abs(_floats(self._loop, x)).max(axis=(-2, -1)) > CLOSED] = np.nan
+        return x, xd, xdd, G
+
+    def actuated_regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """G' D_tree at actuated q, qd, qdd (..., n_a), order `robot.joints`: (..., n_a, p)."""
+        *state, G = self.motion(q, qd, qdd)
+        return np.swapaxes(G, -1, -2) @ self.regressor(*state)
+
+
+def _jacobian(T: SX, q: SX) -> SX:
+    """6 x n of a pose: velocity of the origin; angular velocity w from hat(w) = Rdot R'."""
+    R, dR = T[:3, :3], ca.jacobian(ca.vec(T[:3, :3]), q)
+    columns = []
+    for k in range(q.shape[0]):
+        W = ca.reshape(dR[:, k], 3, 3) @ R.T
+        columns.append(ca.vertcat(W[2, 1], W[0, 2], W[1, 0]))
+    return ca.vertcat(ca.jacobian(T[:3, 3], q), ca.horzcat(*columns))
+
+
+def _closure(robot: Robot, T: Mapping[int, SX], q: SX, constants: Mapping[str, float]) -> SX:
+    """phi(q), zero where every twin coincides with its cut frame and every constrained joint has its value."""
+    phi = []
+    for loop in robot.loops:
+        cut, twin = T[loop.cut], T[loop.twin]
+        phi += [ca.vec(cut[:3, :3].T @ twin[:3, :3] - ca.SX.eye(3)), twin[:3, 3] - cut[:3, 3]]
+    names = {f"q{j}": q[k] for k, j in enumerate(robot.moving)}
+    phi += [names[f"q{j}"] - _symbolic(e, names, constants) for j, e in robot.constraints.items()]
+    return ca.densify(ca.vertcat(*phi)) if phi else ca.SX.zeros(0)
+
+
+def _start(robot: Robot, q: SX, constants: Mapping[str, float]) -> Any:
+    """Function from the actuated joints to all: passive ones from their constraint, else from `start` of their loop, else 0."""
+    names = {f"q{j}": q[k] for k, j in enumerate(robot.moving)}
+    guess = {j: x for loop in robot.loops for j, x in loop.start.items()}
+    x = [names[f"q{j}"] if j in robot.joints else ca.SX(guess.get(j, 0.0)) for j in robot.moving]
+    for _ in robot.constraints:  # a constraint may name joints that have one themselves
+        now = dict(zip(names, x, strict=True))
+        x = [_symbolic(robot.constraints[j], now, constants) if j in robot.constraints else now[f"q{j}"] for j in robot.moving]
+    return ca.Function("start", [ca.vertcat(*(names[f"q{j}"] for j in robot.joints))], [ca.densify(ca.vertcat(*x))])
+
+
+def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, float]) -> SX:
+    values = {"pi": np.pi, **constants, **q}
+
+    def function(name: str, argument: Expression) -> SX:
+        x = _symbolic(argument, q, constants)
+        return 1 / x if name == "inv" else getattr(ca, name)(x)
+
+    return ca.SX(e.evaluate(values.__getitem__, function, float))
+
+
+def numeric_regressor(
+    robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None
+) -> tuple[Array, tuple[str, ...]]:
+    """W of `states` random states (0 <= q < 2 pi rad or within 1 m; loops near their start) and the names of its columns.
+
+    W : ndarray, shape (n_a*states, p), rows joint-major. Velocities and accelerations are standard normal.
+    """
+    model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
+    start = {j: x for loop in robot.loops for j, x in loop.start.items()}
+    free = not robot.loops or set(robot.passive) <= set(robot.constraints)
+    reach = np.array([np.pi if robot.frame(j).sigma == REVOLUTE and free else 1.0 if free else 0.5 for j in robot.joints])
+    centre = np.array([start.get(j, 0.0) for j in robot.joints])
+    n, D = len(robot.joints), np.empty((0, len(robot.joints), len(robot.parameters)))
+    for _ in range(DRAWS):
+        q, qd, qdd = centre + reach * rng.uniform(-1, 1, (states, n)), *rng.standard_normal((2, states, n))
+        block = model.actuated_regressor(q, qd, qdd)
+        D = np.concatenate([D, block[np.isfinite(block).all(axis=(1, 2))]])[:states]
+        if len(D) == states:
+            break
+    return D.transpose(1, 0, 2).reshape(n * len(D), -1), robot.parameters
