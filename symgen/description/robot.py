@@ -227,9 +227,9 @@ def check_identifier(name: str, path: Path) -> None:
 
 def _check_text(text: str, name: str) -> None:
     """Titles end up in docstrings and comments of emitted files: nothing in them may close one."""
-    if not text.isprintable() or len(text) > 1000 or any(mark in text for mark in ("\\", '"""', "*/", "/*")):
+    if not text.isprintable() or len(text) > 1000 or text.endswith('"') or any(mark in text for mark in ("\\", '"""', "*/", "/*")):
         raise DescriptionError(
-            f"{name} {text[:60]!r}: expected one line of printable text, at most 1000 characters, without \\, triple quotes, /* or */",
+            f"{name} {text[:60]!r}: expected one line of printable text, at most 1000 characters, without \\, triple or final quotes, /* or */",
             path=(name,),
         )
 

@@ -1,0 +1,170 @@
+"""The robot file as pydantic models: which keys exist, of which type; meaning is checked by `robot.Robot`.
+
+Expressions stay text here (`Symbolic`) and are read by `expression.parse` when their symbols are known; constant expressions
+(`Number`: 0.225, pi/2, 2*pi/10000) become floats at once.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
+
+from symgen.description.expression import parse
+from symgen.description.robot import DIRECTIONS, KINDS, Path
+from symgen.errors import ExpressionError
+
+SCHEMA = 1  # version of the robot file
+
+
+def _symbolic(value: Any) -> str:
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError("expected a number or an expression such as q1, -pi/2 or D3 + 0.1")
+    return value if isinstance(value, str) else repr(value)
+
+
+def _number(value: Any) -> float:
+    text = _symbolic(value)
+    try:
+        number = float(parse(text, ()))
+    except ExpressionError as error:
+        raise ValueError(f"expected a number or a constant expression such as pi/2; {error}") from error
+    except (ValueError, ZeroDivisionError, OverflowError) as error:
+        raise ValueError("expected a number; this expression has no finite real value") from error
+    if not math.isfinite(number):
+        raise ValueError("expected a finite number")
+    return number
+
+
+_TEXT_OR_NUMBER = WithJsonSchema({"type": ["number", "string"]})
+Symbolic = Annotated[str, BeforeValidator(_symbolic), _TEXT_OR_NUMBER]
+Number = Annotated[float, BeforeValidator(_number), _TEXT_OR_NUMBER]
+Interval = Annotated[tuple[Number, Number], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else (f"-({_symbolic(v)})", v))]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class FrameRow(_Table):
+    """One row of the table of Khalil and Kleinfinger."""
+
+    ant: int = Field(description="antecedent frame, 0 for the base")
+    sigma: int = Field(description="0 revolute, 1 prismatic, 2 fixed")
+    mu: int | None = Field(default=None, description="1 actuated, 0 passive; default 1, for a fixed frame 0")
+    gamma: Symbolic = "0"
+    b: Symbolic = "0"
+    alpha: Symbolic
+    d: Symbolic
+    theta: Symbolic
+    r: Symbolic
+
+
+class LoopRow(_Table):
+    """A closed loop: frame `twin`, fixed, coincides with the frame of the cut joint."""
+
+    cut: int
+    twin: int
+    start: dict[str, Number] = Field(default={}, description="picks the assembly mode: {q3: 1.2}")
+
+
+class ElementTable(_Table):
+    """Inertia, friction, offset or spring on the joint coordinates."""
+
+    kind: str = Field(description=f"one of {', '.join(KINDS)}", json_schema_extra={"enum": list(KINDS)})
+    along: Literal["all"] | dict[int, Symbolic] = Field(default={}, description="{6: q5 + q6}, or all: every actuated joint")
+    form: dict[int, Symbolic] = Field(default={}, description="quadratic forms: {6: q6**2 + 2*q5*q6}")
+    when: str | None = Field(
+        default=None, description="direction of motion: positive or negative", json_schema_extra={"enum": [*DIRECTIONS, None]}
+    )
+
+
+class DrivesTable(_Table):
+    """qm = ratio (q - offset), tau = ratio' (torque_constant * u)."""
+
+    ratio: list[list[Number]]
+    offset: list[Number] | None = Field(default=None, description="joint positions where the motors read 0; default 0")
+    torque_constant: list[Number] | Number = Field(default=1.0, description="a number, or one per motor")
+
+
+class LimitsTable(_Table):
+    """For exciting trajectories, one entry per actuated joint."""
+
+    q: list[Interval] | None = Field(default=None, description="[lower, upper], or one number for +- that number")
+    qd: list[Number] | None = None
+    qdd: list[Number] | None = None
+    tau: list[Number] | None = None
+
+
+class RobotFile(_Table):
+    """A robot file, schema version 1."""
+
+    symgen: int = Field(description="schema version")
+    name: str = Field(description="identifier; names the emitted module")
+    title: str = ""
+    source: str = ""
+    gravity: list[Symbolic] = Field(description="acceleration of gravity in frame 0: [0, 0, -g]", min_length=3, max_length=3)
+    constants: dict[str, Number] = {}
+    frames: dict[int, FrameRow] = Field(description="1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}")
+    loops: list[LoopRow] = []
+    constraints: dict[str, Symbolic] = Field(default={}, description="passive joints: {q3: q5 - q2 + pi}")
+    massless: list[int] = Field(default=[], description="links without inertial parameters")
+    elements: dict[str, ElementTable] = {}
+    drives: DrivesTable | None = None
+    limits: LimitsTable = Field(default_factory=LimitsTable)
+    values: dict[str, Number] = Field(default={}, description="standard parameters, SI; never used in the derivation")
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of a robot file, for editors."""
+    return RobotFile.model_json_schema()
+
+
+_EXPECTED = {
+    "int_type": "a whole number",
+    "string_type": "text; put it between quotes",
+    "dict_type": "a table {key: value}",
+    "model_type": "a table {key: value}",
+    "list_type": "a list [a, b, ...]",
+    "tuple_type": "a list [lower, upper]",
+    "literal_error": "`all` or a table such as {1: q1}",
+}
+
+
+def explain(error: ValidationError) -> tuple[str, Path]:
+    """Message and path of the first thing that is wrong."""
+    first = error.errors(include_url=False)[0]
+    path = tuple(
+        key for key in first["loc"] if key != "[key]" and not str(key).startswith(("dict[", "list[", "tuple[", "literal[", "function-"))
+    )
+    place = ".".join(str(key) for key in path) or "robot file"
+    given = repr(first["input"])
+    given = given if len(given) <= 60 else given[:60] + " ..."
+    if first["type"] == "extra_forbidden":
+        keys = _keys(path[:-1])
+        close = difflib.get_close_matches(str(path[-1]), keys, 1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        return f"{place}: unknown key {path[-1]!r}; expected {', '.join(keys)}{hint}", path
+    if first["type"] == "missing":
+        return f"{'.'.join(str(key) for key in path[:-1]) or 'robot file'}: key {path[-1]!r} is missing; add it", path[:-1]
+    if first["type"] in ("too_short", "too_long", "missing_positional_only_argument", "unexpected_positional_argument"):
+        return f"{place}: found {given}; {first['msg'].removeprefix('List').removeprefix('Tuple').strip()}", path
+    if first["loc"][-1:] == ("[key]",):
+        given = repr(path[-1])
+    expected = _EXPECTED.get(first["type"])
+    text = f"expected {expected}" if expected else first["msg"].removeprefix("Value error, ")
+    return f"{place}: found {given}; {text}", path
+
+
+def _keys(path: Path) -> list[str]:
+    """The keys a table may have."""
+    tables: dict[str, type[_Table]] = {
+        "frames": FrameRow,
+        "loops": LoopRow,
+        "elements": ElementTable,
+        "drives": DrivesTable,
+        "limits": LimitsTable,
+    }
+    return list((tables[str(path[0])] if path else RobotFile).model_fields)
