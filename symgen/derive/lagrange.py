@@ -28,6 +28,7 @@ import numpy as np
 
 from symgen.description.expression import Expression
 from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Robot, parameter
+from symgen.errors import DescriptionError
 
 Array = np.ndarray[Any, Any]
 NEWTON_STEPS, NEWTON_STEP, CLOSED = 50, 0.5, 1e-11  # iterations, rad or m per iteration, defect of a closed loop
@@ -267,7 +268,7 @@ def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, float]
 def numeric_regressor(
     robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None
 ) -> tuple[Array, tuple[str, ...]]:
-    """W of `states` random states (0 <= q < 2 pi rad or within 1 m; loops near their start) and the names of its columns.
+    """W of `states` random states (q within pi rad or 1 m, general loops within 0.5 of their start) and the names of its columns.
 
     W : ndarray, shape (n_a*states, p), rows joint-major. Velocities and accelerations are standard normal.
     """
@@ -283,4 +284,9 @@ def numeric_regressor(
         D = np.concatenate([D, block[np.isfinite(block).all(axis=(1, 2))]])[:states]
         if len(D) == states:
             break
+    else:
+        raise DescriptionError(
+            f"{robot.name}: the loops close in {len(D)} of {DRAWS * states} random states near their start; give each loop a `start` that closes it",
+            path=("loops",),
+        )
     return D.transpose(1, 0, 2).reshape(n * len(D), -1), robot.parameters

@@ -41,13 +41,17 @@ def six_r() -> Robot:
     return robot("six_r", rows, ("0", "0", "-g"), {"D3": 0.225, "RL4": 0.31, "g": 9.81})
 
 
-def four_bar() -> Robot:
-    """Parallelogram: joint 1 actuated; 2, 3 passive, 4 cut; frame 5 on link 3 coincides with frame 4."""
+def four_bar(rocker: float = 0.3, start: dict[int, float] | None = None) -> Robot:
+    """Four-bar linkage in the plane: crank q1 actuated; coupler q2, rocker q3 passive, 4 cut; frame 5 on link 3 coincides with frame 4.
+
+    A parallelogram when the rocker is as long as the crank, 0.3 m.
+    """
     rows: list[Row] = [
         (0, REVOLUTE, "0", "0", "q1", "0"),
         (1, REVOLUTE, "0", "L1", "q2", "0"),
         (0, REVOLUTE, "0", "L2", "q3", "0"),
         (2, REVOLUTE, "0", "L2", "q4", "0"),
-        (3, FIXED, "0", "L1", "0", "0"),
+        (3, FIXED, "0", "L3", "0", "0"),
     ]
-    return robot("four_bar", rows, ("0", "-g", "0"), {"L1": 0.3, "L2": 0.5, "g": 9.81}, passive=(2, 3, 4), loops=(Loop(4, 5),))
+    constants = {"L1": 0.3, "L2": 0.5, "L3": rocker, "g": 9.81}
+    return robot("four_bar", rows, ("0", "-g", "0"), constants, passive=(2, 3, 4), loops=(Loop(4, 5, start or {}),))

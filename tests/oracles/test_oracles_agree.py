@@ -13,6 +13,7 @@ from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import describe_mix, random_parameters, random_robot, random_state
 from symgen.derive.lagrange import Lagrange, numeric_regressor
 from symgen.description.robot import Robot
+from symgen.errors import DescriptionError
 
 ROBOTS = [planar_2r(), six_r(), *(random_robot(seed) for seed in range(30))]
 TOLERANCE = 1e-10
@@ -68,21 +69,51 @@ def test_numeric_regressor() -> None:
     assert not W[:40, names.index("FV2")].any() and W[40:80, names.index("FV2")].all()  # rows joint-major
 
 
-def test_loop_closure() -> None:
-    """A parallelogram in the plane: the passive joints follow from the loop, G and Gdot from finite differences."""
-    robot = four_bar()
-    model = Lagrange(robot)
-    a = np.array([[0.7], [-0.4]])
-    qd, qdd = np.array([[1.3], [0.6]]), np.array([[-0.5], [0.9]])
+def test_parallelogram_closes() -> None:
+    """Opposite bars stay parallel: q2 = -q1, q3 = q1, q4 = q1, so G is constant."""
+    model = Lagrange(four_bar())
+    a, qd, qdd = np.array([[0.7], [-0.4]]), np.array([[1.3], [0.6]]), np.array([[-0.5], [0.9]])
     q, v, acc, G = model.motion(a, qd, qdd)
-    close(q, np.column_stack([a[:, 0], -a[:, 0], a[:, 0], a[:, 0]]))
-    close(G[..., 0], np.tile([1.0, -1.0, 1.0, 1.0], (2, 1)))
-    close(v, G[..., 0] * qd)
-    close(acc, G[..., 0] * qdd)
+    ratio = np.array([1.0, -1.0, 1.0, 1.0])
+    close(q, a * ratio)
+    close(G[..., 0], np.tile(ratio, (2, 1)))
+    close(v, qd * ratio)
+    close(acc, qdd * ratio)
     T = model.poses(q)
     close(T[:, 3], T[:, 4])  # the twin coincides with the cut frame
-    W, _ = numeric_regressor(robot, states=30, seed=1)
-    assert W.shape == (30, len(robot.parameters)) and np.isfinite(W).all()
+
+
+def test_general_loop_moves_as_its_power_says() -> None:
+    """Velocities and accelerations against central differences (step 1e-4 s); d(E + U)/dt = Gamma_a qda without friction."""
+    robot = four_bar(rocker=0.45, start={1: 1.4, 2: -0.9, 3: 1.1, 4: 0.6})
+    model, h = Lagrange(robot), 1e-4
+
+    def path(t):
+        t = np.asarray(t)[:, None]
+        return 1.4 + 0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t)
+
+    times = np.array([0.1, 0.4, 0.8])
+    (q0, v0, _, _), (q, v, acc, _), (q1, v1, _, _) = (model.motion(*path(times + k * h)) for k in (-1, 0, 1))
+    assert np.isfinite(q).all() and np.allclose((q1 - q0) / (2 * h), v, atol=1e-6) and np.allclose((v1 - v0) / (2 * h), acc, atol=1e-6)
+    friction = [k for k, name in enumerate(robot.parameters) if name.startswith("F")]
+    chi = random_parameters(robot, seed=4)
+    chi[friction] = 0
+
+    def energy(q, v):
+        return 0.5 * np.einsum("ti,tij,tj->t", v, model.inertia_matrix(q, chi), v)
+
+    weight = np.einsum("ti,ti->t", model.gravity(q, chi), v)
+    power = (energy(q1, v1) - energy(q0, v0)) / (2 * h) + weight
+    actuated = model.actuated_regressor(*path(times)) @ chi
+    assert np.allclose(actuated[:, 0] * path(times)[1][:, 0], power, atol=1e-5)
+
+
+def test_numeric_regressor_of_loops() -> None:
+    for robot in (four_bar(), four_bar(rocker=0.45, start={1: 1.4, 2: -0.9, 3: 1.1, 4: 0.6})):
+        W, _ = numeric_regressor(robot, states=30, seed=1)
+        assert W.shape == (30, len(robot.parameters)) and np.isfinite(W).all()
+    with pytest.raises(DescriptionError, match="close in 0 of"):
+        numeric_regressor(four_bar(rocker=3.0), states=5)
 
 
 def test_mix_of_random_robots() -> None:
