@@ -28,6 +28,8 @@ from runtime.study import EstimateSettings
 
 CONVERGED = 1e-3
 """Relative change of every s_j at which iterated weights have converged."""
+EXACT = 1e-12
+"""Residual over torque (rms) below which a joint is fitted exactly; what remains is rounding and says nothing about weights."""
 PASSES = 50
 """Largest number of passes of iterated weights; option `passes`."""
 
@@ -63,8 +65,8 @@ def _common_scales(raw: Factor, X: np.ndarray, tolerance: float | None) -> np.nd
 
 
 def _floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
-    """Scales not below the rounding of Y_j: an exact fit of a joint must not weigh infinitely."""
-    rounding = [np.finfo(float).eps * joint.measured_norm / np.sqrt(max(joint.rows, 1)) for joint in raw.joints]
+    """Scales not below EXACT times the rms of Y_j: an exact fit of a joint must not weigh infinitely."""
+    rounding = [EXACT * joint.measured_norm / np.sqrt(max(joint.rows, 1)) for joint in raw.joints]
     floored = np.maximum(scales, rounding)
     smallest = floored[floored > 0].min(initial=np.inf)
     return np.where(floored > 0, floored, smallest if np.isfinite(smallest) else 1.0)

@@ -1,0 +1,40 @@
+"""Motions, observations and records of the planar arm, for tests of what stands on Y = W X + rho."""
+
+import numpy as np
+import planar_2r_model as planar
+
+from runtime.observation import Observation
+
+TRUE = np.array([1.8, 2.4, 0.15, 6.0, 4.0, 0.35, 0.9, -0.08, 2.0, 1.5])
+"""Parameters in the order of planar.BASE_PARAMETERS, SI."""
+
+
+def motion(t):
+    """q, qd, qdd of shape (N, 2) of a smooth exciting motion; t, shape (N,), s."""
+    amplitude = np.array([[0.9, 0.4, 0.2], [1.1, 0.5, 0.15]])
+    pulsation = np.array([[1.3, 3.1, 7.3], [1.7, 4.3, 8.9]])
+    phase = pulsation * np.asarray(t)[:, None, None] + np.array([[0.3, 1.0, 2.0], [0.7, 0.1, 1.3]])
+    q = (amplitude * np.sin(phase)).sum(-1)
+    qd = (amplitude * pulsation * np.cos(phase)).sum(-1)
+    qdd = -(amplitude * pulsation**2 * np.sin(phase)).sum(-1)
+    return q, qd, qdd
+
+
+def observation(N=300, rate=30.0, noise=(0.0, 0.0), seed=0, X=TRUE, motion=motion, colour=None):
+    """Observation of N instants with noise of deviation noise[j] (N m) on joint j; `colour` filters a (2, N) white array."""
+    t = np.arange(N) / rate
+    W = planar.observation_matrix(*motion(t))
+    white = np.random.default_rng(seed).standard_normal((2, N))
+    error = white if colour is None else colour(white)
+    Y = W @ X + (np.array(noise)[:, None] * error).reshape(-1)
+    return Observation(
+        W=W,
+        Y=Y,
+        rows=(N, N),
+        names=planar.BASE_PARAMETERS,
+        t=np.tile(t, 2),
+        record=np.zeros(2 * N, dtype=int),
+        rate=rate,
+        settings={"signals": {"median": 1}},
+        files={"q.csv": "ab" * 32},
+    )

@@ -1,0 +1,267 @@
+"""Least squares: exact data, oracle, statistics, weights, rank, down-dating."""
+
+from dataclasses import replace
+
+import numpy as np
+import planar_2r_model as planar
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from planar_data import TRUE, motion, observation
+from scipy.signal import lfilter
+
+from runtime.errors import SettingsError
+from runtime.estimators import LINEAR, estimate, linear_system
+from runtime.estimators.correlated import block_of_rows
+from runtime.estimators.solution import null_groups, solve
+from runtime.estimators.triangular import combine, factor
+from runtime.study import EstimateSettings
+
+OLS = EstimateSettings()
+WLS = EstimateSettings(method="wls")
+EVERY = [OLS, WLS, EstimateSettings(method="wls", weights="iterated"), EstimateSettings(method="wls", weights="covariance")]
+KINDS = ["ols", "wls", "wls iterated", "wls covariance"]
+
+
+@pytest.mark.parametrize("settings", EVERY[:3], ids=KINDS[:3])
+def test_exact_data_return_the_parameters(settings):
+    found = estimate(observation(), settings, model=planar)
+    assert found.status == "ok"
+    assert np.allclose(found.X, TRUE, rtol=1e-9, atol=0)  # cond 1e2, rounding 1e-16
+    assert found.relative_error < 1e-10
+
+
+def test_exact_data_have_no_residual_covariance():
+    found = estimate(observation(), EVERY[3])
+    assert np.allclose(found.X, TRUE, rtol=1e-9, atol=0)
+
+
+@pytest.mark.parametrize("settings", EVERY, ids=KINDS)
+def test_noisy_data_stay_within_five_deviations(settings):
+    found = estimate(observation(noise=(0.3, 0.05), seed=4), settings)
+    assert np.all(np.abs(found.X - TRUE) < 5 * found.sigma)
+
+
+def test_ordinary_equals_lstsq_and_its_formulas():
+    seen = observation(noise=(0.3, 0.05), seed=1)
+    W, Y = seen.W, seen.Y
+    X, *_ = np.linalg.lstsq(W, Y, rcond=None)
+    found = estimate(seen, OLS)
+    variance = np.sum((Y - W @ X) ** 2) / (len(Y) - 10)  # eq. (9)
+    covariance = variance * np.linalg.inv(W.T @ W)  # eq. (10), the textbook form: an oracle, not the method
+    assert np.allclose(found.X, X, rtol=1e-11)
+    assert np.isclose(found.sigma_rho, np.sqrt(variance), rtol=1e-11)
+    assert np.allclose(found.covariance, covariance, rtol=1e-9)
+    assert np.allclose(found.relative_sigma, 100 * np.sqrt(np.diag(covariance)) / np.abs(X), rtol=1e-9)
+    assert np.isclose(found.cond, np.linalg.cond(W), rtol=1e-9)
+    assert np.isclose(found.cond_unit, np.linalg.cond(W / np.linalg.norm(W, axis=0)), rtol=1e-9)
+    assert np.isclose(found.relative_error, 100 * np.linalg.norm(Y - W @ X) / np.linalg.norm(Y), rtol=1e-11)
+    for j, fit in enumerate(found.per_joint):
+        rows = seen.joint(j)
+        assert np.isclose(fit.residual_norm, np.linalg.norm(Y[rows] - W[rows] @ X), rtol=1e-10)
+    assert np.isclose(np.sqrt(sum(fit.residual_norm**2 for fit in found.per_joint)), found.residual_norm)
+
+
+def test_weighted_equals_lstsq_of_divided_rows():
+    seen = observation(noise=(0.4, 0.02), seed=2)
+    scale = []
+    for j in range(2):
+        own = seen.W[seen.joint(j)]
+        _, square, rank, _ = np.linalg.lstsq(own[:, own.any(axis=0)], seen.Y[seen.joint(j)], rcond=None)
+        scale.append(np.sqrt(square[0] / (300 - rank)))
+    s = np.repeat(scale, 300)
+    X, *_ = np.linalg.lstsq(seen.W / s[:, None], seen.Y / s, rcond=None)
+    found = estimate(seen, WLS)
+    assert np.allclose([fit.scale for fit in found.per_joint], scale, rtol=1e-10)
+    assert np.allclose(found.X, X, rtol=1e-10)
+    assert np.allclose(found.covariance, np.linalg.inv((seen.W / s[:, None] ** 2).T @ seen.W), rtol=1e-8)
+    assert 0.8 < found.sigma_rho < 1.2  # residuals of a weighted system have unit variance
+
+
+def test_covariance_weights_equal_generalised_least_squares():
+    mixing = np.array([[0.3, 0.0], [0.12, 0.05]])
+    seen = observation(noise=(1.0, 1.0), colour=lambda white: mixing @ white, seed=3)
+    X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
+    E = (seen.Y - seen.W @ X).reshape(2, -1)
+    V = np.kron(np.linalg.inv(E @ E.T / (300 - 10 / 2)), np.eye(300))
+    expected = np.linalg.solve(seen.W.T @ V @ seen.W, seen.W.T @ V @ seen.Y)
+    found = estimate(seen, EVERY[3])
+    assert np.allclose(found.X, expected, rtol=1e-9)
+    assert np.allclose(found.covariance, np.linalg.inv(seen.W.T @ V @ seen.W), rtol=1e-8)
+
+
+def test_stated_sigma_matches_the_scatter_of_200_runs():
+    # per parameter sum z^2 is chi2(200); 1e-4 and 1 - 1e-4 quantiles over 10 parameters: 1 in 500 that a correct code fails, the seed is fixed
+    low, high = 131.4, 287.4  # scipy.stats.chi2.ppf([5e-5, 1 - 5e-5], 200)
+    for settings, stated in ((OLS, "sigma"), (WLS, "sigma"), (OLS, "sigma_corrected")):
+        noise = (0.2, 0.2) if settings is OLS else (0.4, 0.03)
+        fits = [estimate(observation(N=150, noise=noise, seed=s), settings) for s in range(200)]
+        z2 = np.array([((fit.X - TRUE) / getattr(fit, stated)) ** 2 for fit in fits]).sum(axis=0)
+        slack = 1.15 if stated == "sigma_corrected" else 1.02  # sigma itself is estimated, from 30 blocks: t instead of normal
+        assert np.all(z2 > low / slack) and np.all(z2 < high * slack), (stated, z2)
+
+
+def test_corrected_sigma_follows_correlated_residuals():
+    """First-order coloured noise: (10) states too little, the block covariance the right order."""
+    a = 0.8
+
+    def colour(white):
+        return np.sqrt(1 - a**2) * lfilter([1], [1, -a], white, axis=1)
+
+    fits = [estimate(observation(N=600, rate=30, noise=(0.3, 0.3), seed=s, colour=colour), OLS) for s in range(200)]
+    scatter = np.std([fit.X for fit in fits], axis=0, ddof=1)
+    stated = np.mean([fit.sigma for fit in fits], axis=0)
+    corrected = np.mean([fit.sigma_corrected for fit in fits], axis=0)
+    assert (scatter / stated).max() > 1.6
+    assert np.all(scatter / corrected < 1.35) and np.all(scatter / corrected > 0.75)
+
+
+def test_blocks_gather_all_joints_of_an_interval():
+    seen = observation(N=40, rate=10)
+    blocks = block_of_rows(seen, 1.0)
+    assert np.array_equal(blocks[:40], np.repeat(np.arange(4), 10))
+    assert np.array_equal(blocks[:40], blocks[40:])
+    two = replace(seen, record=np.tile(np.repeat([0, 1], 20), 2))
+    assert len(set(block_of_rows(two, 1.5))) == 4  # 2 s each: no block spans two records
+
+
+@given(st.floats(1e-4, 1e4), st.floats(1e-4, 1e4), st.integers(0, 1000))
+def test_weighted_estimate_ignores_the_scale_of_a_joint(c1, c2, seed):
+    seen = observation(N=80, noise=(0.3, 0.05), seed=seed)
+    c = np.repeat([c1, c2], 80)
+    scaled = replace(seen, W=seen.W * c[:, None], Y=seen.Y * c)
+    first, second = estimate(seen, WLS), estimate(scaled, WLS)
+    assert np.allclose(first.X, second.X, rtol=1e-9)
+    assert np.allclose(first.sigma, second.sigma, rtol=1e-9)
+
+
+def test_iterated_weights_reach_a_fixed_point():
+    found = estimate(observation(noise=(0.4, 0.03), seed=5), EVERY[2])
+    assert found.status == "ok" and 1 <= found.iterations < 10
+    assert np.allclose([fit.scale for fit in found.per_joint], [fit.sigma_rho for fit in found.per_joint], rtol=2e-3)
+    stopped = estimate(observation(noise=(0.4, 0.03), seed=5), replace(EVERY[2], options={"passes": 1}))
+    assert stopped.status in ("ok", "not-converged")
+
+
+def test_downdating_equals_refactoring():
+    seen = observation(noise=(0.3, 0.05), seed=6)
+    whole = factor(seen.W, seen.Y, seen.rows, seen.names)
+    dropped = whole.drop("MY1").drop("FS2").drop("ZZ1R")
+    kept = [i for i, name in enumerate(seen.names) if name not in ("MY1", "FS2", "ZZ1R")]
+    fresh = factor(seen.W[:, kept], seen.Y, seen.rows, [seen.names[i] for i in kept])
+    assert dropped.names == fresh.names
+    assert np.allclose(dropped.R, np.triu(dropped.R))
+    assert np.allclose(np.abs(dropped.R), np.abs(fresh.R), atol=1e-11 * np.abs(fresh.R).max())
+    X = solve(dropped).X
+    assert np.allclose(X, solve(fresh).X, rtol=1e-10)
+    for a, b in zip(dropped.joints, fresh.joints, strict=True):
+        assert np.isclose(a.residual_norm(X), b.residual_norm(X), rtol=1e-10)
+    assert np.allclose(solve(whole.select(fresh.names)).X, X, rtol=1e-10)
+
+
+def test_parts_combine_to_the_whole():
+    seen = observation(N=200, noise=(0.3, 0.05), seed=7)
+    half = [np.r_[0:90, 200:290], np.r_[90:200, 290:400]]
+    parts = [factor(seen.W[rows], seen.Y[rows], (len(rows) // 2,) * 2, seen.names) for rows in half]
+    both, whole = combine(parts), factor(seen.W, seen.Y, seen.rows, seen.names)
+    X = solve(whole).X
+    assert both.rows == whole.rows
+    assert np.allclose(solve(both).X, X, rtol=1e-10)
+    assert np.allclose([j.residual_norm(X) for j in both.joints], [j.residual_norm(X) for j in whole.joints], rtol=1e-10)
+
+
+def one_joint_at_rest(t):
+    q, qd, qdd = motion(t)
+    for x in (q, qd, qdd):
+        x[:, 1] = 0
+    return q, qd, qdd
+
+
+@pytest.mark.parametrize("settings", EVERY[:3], ids=KINDS[:3])
+def test_rank_loss_names_the_parameters(settings):
+    """Joint 2 at rest at q2 = 0: no friction of joint 2; inertias and first moments of the two links merge."""
+    found = estimate(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)), settings)
+    assert found.status == "rank-deficient"
+    assert found.rank < 10
+    assert {("FV2",), ("FS2",)} <= set(found.groups)
+    assert np.isinf(found.cond)
+    assert "FV2, FS2" in found.message and "told apart" not in found.message.split("Likely")[1]
+    determined = [name for name in found.names if not any(name in group for group in found.groups)]
+    assert {"FV1", "FS1"} <= set(determined)
+    assert np.all(np.isfinite([found.sigma[found.names.index(name)] for name in determined]))
+    assert all(np.isnan(found.sigma[found.names.index(name)]) for group in found.groups for name in group)
+    for fit, residual in zip(found.per_joint, (0.1, 0.1), strict=True):
+        assert np.isclose(fit.sigma_rho, residual, rtol=0.2)
+
+
+def test_rank_loss_groups_are_separate():
+    seen = observation(noise=(0.1, 0.1))
+    W = seen.W.copy()
+    W[:, 2] = 3e4 * W[:, 1]  # units must not matter
+    W[:, 9] = 1e-3 * W[:, 8]
+    found = estimate(replace(seen, W=W), OLS)
+    assert found.rank == 8
+    assert set(found.groups) == {("MX1R", "MY1"), ("FV2", "FS2")}
+    assert "(MX1R, MY1)" in found.message
+
+
+def test_null_groups_follow_the_projector_not_the_basis():
+    rng = np.random.default_rng(0)
+    basis = np.zeros((2, 5))
+    basis[0, [0, 1]], basis[1, [2, 4]] = np.sqrt(0.5), (0.6, 0.8)
+    turn, _ = np.linalg.qr(rng.standard_normal((2, 2)))
+    assert null_groups(turn @ basis, "abcde") == (("a", "b"), ("c", "e"))
+
+
+def test_few_rows_are_a_status():
+    seen = observation(N=5)
+    found = estimate(seen, OLS)
+    assert found.status in ("no-redundancy", "rank-deficient")
+    assert np.all(np.isnan(found.sigma))
+    assert found.message
+
+
+def test_columns_restrict_the_estimate():
+    seen = observation(noise=(0.1, 0.1))
+    kept = ("ZZ1R", "FV1", "FS1", "MX1R", "ZZ2", "MX2", "FV2", "FS2")
+    found = estimate(seen, EstimateSettings(columns=kept))
+    fresh, *_ = np.linalg.lstsq(seen.W[:, [seen.names.index(name) for name in kept]], seen.Y, rcond=None)
+    assert found.names == kept
+    assert np.allclose(found.X, fresh, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        (EstimateSettings(method="cloe"), "ols or wls"),
+        (EstimateSettings(weights="joint"), "belong to method wls"),
+        (EstimateSettings(columns=("ZZ9",)), "no parameter ZZ9"),
+        (EstimateSettings(options={"colour": 1}), "unknown option 'colour'"),
+        (EstimateSettings(options={"block": -1}), "expected a positive number"),
+    ],
+)
+def test_wrong_settings_say_what_to_do(settings, text):
+    with pytest.raises(SettingsError, match=text):
+        estimate(observation(N=50), settings)
+
+
+def test_covariance_weights_need_every_joint_at_every_instant():
+    seen = observation(N=50)
+    keep = np.r_[0:50, 55:100]
+    short = replace(seen, W=seen.W[keep], Y=seen.Y[keep], rows=(50, 45), t=seen.t[keep], record=seen.record[keep])
+    with pytest.raises(SettingsError, match="50, 45"):
+        estimate(short, EVERY[3])
+
+
+def test_wrong_shapes_name_both():
+    seen = observation(N=50)
+    with pytest.raises(ValueError, match=r"\(100, 10\).*\(99,\)"):
+        factor(seen.W, seen.Y[:-1], seen.rows, seen.names)
+    with pytest.raises(ValueError, match="not finite"):
+        factor(seen.W * np.nan, seen.Y, seen.rows, seen.names)
+
+
+def test_each_joint_is_factored_on_its_own_columns():
+    system = linear_system(observation(), OLS)
+    assert [list(joint.columns) for joint in system.raw.joints] == [list(np.flatnonzero(planar.STRUCTURE[:, j])) for j in range(2)]
+    assert set(LINEAR) == {"ols", "wls"}
