@@ -41,7 +41,8 @@ class PinocchioModel:
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
         """D with Gamma = D chi, (n, p)."""
-        links = pin.computeJointTorqueRegressor(self.model, self.data, *map(self._full, (q, qd, qdd)))[self.rows]
+        links = pin.computeJointTorqueRegressor(self.model, self.data, *map(self._full, (q, qd, qdd)))
+        links = links.reshape(len(self.robot.frames), -1)[self.rows]  # one joint: pinocchio returns a vector
         D = np.zeros((len(self.rows), len(self.names)))
         for (p, j), k in self.columns.items():
             if f"{p}{j}" in self.names:
@@ -74,7 +75,7 @@ class PinocchioModel:
         """A by the composite rigid body algorithm and the inertia elements, (n, n)."""
         value = self._set_inertias(chi)
         pin.crba(self.model, self.data, self._full(q))
-        A = np.triu(self.data.M)
+        A = np.triu(self.data.M.reshape(len(self.robot.frames), -1))
         A = (A + np.triu(A, 1).T)[np.ix_(self.rows, self.rows)]
         zero = np.zeros(len(self.rows))
         rest = self._elements(value, q, zero, zero)
@@ -96,7 +97,8 @@ class PinocchioModel:
         """Velocity of the origin, then angular velocity, of `frame` (default: the last) in frame 0 per qd, (6, n)."""
         pin.computeJointJacobians(self.model, self.data, self._full(q))
         j = self.joint[frame or self.robot.frames[-1].j]
-        return np.asarray(pin.getJointJacobian(self.model, self.data, j, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)[:, self.rows])
+        J = pin.getJointJacobian(self.model, self.data, j, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        return np.asarray(J.reshape(6, -1)[:, self.rows])
 
 
 def _depth_first(robot: Robot, i: int) -> list[int]:

@@ -13,9 +13,11 @@ from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import describe_mix, random_parameters, random_robot, random_state
 from symgen.derive.lagrange import Lagrange, numeric_regressor
 from symgen.description.robot import Robot
+from symgen.description.yaml import load_robot, packaged_robots
 from symgen.errors import DescriptionError
 
-ROBOTS = [planar_2r(), six_r(), *(random_robot(seed) for seed in range(30))]
+PACKAGED = [robot for robot in map(load_robot, packaged_robots()) if not robot.passive]
+ROBOTS = [planar_2r(), six_r(), *PACKAGED, *(random_robot(seed) for seed in range(30))]
 TOLERANCE = 1e-10
 
 
