@@ -1,9 +1,6 @@
-"""A measured record: time, joint positions and joint torques, joint side, SI.
+"""A measured record: time, joint positions and joint torques, joint side, SI, uniformly sampled.
 
-    record = read_record(study.record[0], drives, folder=study_file.parent)
-
-Units and side are explicit in the settings, never guessed. Steps: read the columns, scale, units, then the drives (motor side only). Bad
-input raises InputError, which names file, column and sample.
+Reading one from files is `runtime.io.records`; a record made in Python is checked alike.
 """
 
 from __future__ import annotations
