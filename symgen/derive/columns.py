@@ -1,0 +1,33 @@
+"""The columns of the standard regressor, by name: Gamma_a = sum_k D_k chi_k in the actuated joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from symgen.derive.elements import element_column
+from symgen.derive.newton_euler import Motion
+from symgen.derive.regressor import Axes
+from symgen.derive.scalar import Scalar
+from symgen.description.robot import INERTIAL, Element, Robot, parameter
+
+
+def inertial_names(robot: Robot) -> dict[str, tuple[str, int]]:
+    """{name: (inertial parameter, link)}."""
+    return {parameter(p, j): (p, j) for j in robot.links for p in INERTIAL}
+
+
+def element_names(robot: Robot) -> dict[str, tuple[Element, int]]:
+    """{name: (element, key)}."""
+    return {parameter(e.family, j): (e, j) for e in robot.elements for j in e.keys}
+
+
+def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]]:
+    """{name: {actuated joint: D}} of the standard parameters `names`."""
+    robot, closure, algebra = motion.robot, motion.geometry.closure, motion.algebra
+    inertial, elements = inertial_names(robot), element_names(robot)
+    axes = Axes(motion)
+    result: dict[str, dict[int, Scalar]] = {}
+    for name in names:
+        tree = axes.column(*inertial[name]) if name in inertial else element_column(motion, *elements[name])
+        result[name] = tree if closure.is_trivial else closure.project(algebra, tree)
+    return result

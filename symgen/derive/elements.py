@@ -1,0 +1,56 @@
+"""Torque columns of the elements on the joints: inertia, viscous and Coulomb friction, offset, stiffness.
+
+along G, s = G q:   Gamma += c G' x,   x = sdd | sd | sign(sd) | 1 | s
+form B:             Gamma += c B x,    x = qdd | qd | q
+"""
+
+from __future__ import annotations
+
+from symgen.derive.newton_euler import Motion
+from symgen.derive.scalar import Scalar, add, mul
+from symgen.description.robot import Element, Form, Row
+
+
+def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
+    """{i: D_ik} of the parameter of element `e` with key j, i over the moving joints it acts on."""
+    if j in e.form:
+        return _form(motion, e.kind, e.form[j])
+    row = e.along[j]
+    x = _along(motion, e, row)
+    return {i: mul(motion.algebra.constant(g), x) for i, g in row.items()}
+
+
+def _coordinate(motion: Motion, kind: str, j: int) -> Scalar:
+    match kind:
+        case "inertia":
+            return motion.qdd(j)
+        case "viscous" | "coulomb":
+            return motion.qd(j)
+        case _:
+            return motion.q(j)
+
+
+def _along(motion: Motion, e: Element, row: Row) -> Scalar:
+    if e.kind == "offset":
+        return 1 if motion.gravity else 0
+    rate: Scalar = 0
+    for i, g in row.items():
+        rate = add(rate, mul(motion.algebra.constant(g), _coordinate(motion, e.kind, i)))
+    if e.kind in ("viscous", "coulomb"):
+        if len(row) > 1:
+            rate = motion.algebra.name(rate, motion.named("QP", *row))
+        if type(rate) is int:
+            return 0  # at rest
+        key = motion.geometry.closure.active_row(row)
+        if e.when is not None:
+            direction, speed = motion.algebra.one_sided(rate, key, e.when)
+            return direction if e.kind == "coulomb" else speed
+        return motion.algebra.sign(rate, key) if e.kind == "coulomb" else rate
+    return rate
+
+
+def _form(motion: Motion, kind: str, form: Form) -> dict[int, Scalar]:
+    column: dict[int, Scalar] = {}
+    for (i, m), b in form.items():
+        column[i] = add(column.get(i, 0), mul(motion.algebra.constant(b), _coordinate(motion, kind, m)))
+    return column

@@ -1,0 +1,109 @@
+"""Rotations and displacements between the frames of a robot, over any scalars.
+
+    iRj = A_j Rot(z, theta_j),   A_j = Rot(z, gamma_j) Rot(x, alpha_j),   P_ij = b e3 + d A_j e1 + r A_j e3
+
+Consecutive parallel axes (alpha = 0) are one rotation by the sum of their angles: the *carrier* of frame j is the last frame m on
+its path whose z axis is not parallel to z_j, and mRj = A Rot(z, sum of angles). Whatever only rotates (angular velocities,
+joint axes) is taken from the carrier in one step, which is where C23 and S23 come from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from symgen.derive.loops import Closure
+from symgen.derive.scalar import ZERO3, Algebra, Matrix, Scalar, Turn, Vector, add, apply, apply_transposed, mul, sub
+from symgen.description.expression import Expression, call
+from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """A Rot(z, theta); A is None for the identity."""
+
+    A: Matrix | None
+    c: Scalar
+    s: Scalar
+
+    def up(self, v: Vector) -> Vector:
+        """A Rot(z, theta) v: components in the outer frame j to components in the inner frame i."""
+        u = (sub(mul(self.c, v[0]), mul(self.s, v[1])), add(mul(self.s, v[0]), mul(self.c, v[1])), v[2])
+        return u if self.A is None else apply(self.A, u)
+
+    def down(self, v: Vector) -> Vector:
+        """(A Rot(z, theta))' v: components in frame i to components in frame j."""
+        u = v if self.A is None else apply_transposed(self.A, v)
+        return (add(mul(self.c, u[0]), mul(self.s, u[1])), sub(mul(self.c, u[1]), mul(self.s, u[0])), u[2])
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """Frame m of which frame j is turned by `rotation`, about z_j, by the angle `turn` of actuated joints."""
+
+    m: int
+    rotation: Rotation
+    turn: Turn
+
+
+class Geometry:
+    """Rotations, positions and carriers of all frames of `robot` over the scalars of `algebra`."""
+
+    def __init__(self, robot: Robot, algebra: Algebra) -> None:
+        self.robot, self.algebra = robot, algebra
+        self.closure = Closure(robot)
+        self.rotation: dict[int, Rotation] = {}
+        self.P: dict[int, Vector] = {}  # P_ij, origin of frame j in frame i = ant(j)
+        self.carrier: dict[int, Carrier] = {}
+        self._turn: dict[int, tuple[Turn, Expression]] = {}  # turn from the carrier to frame j
+        for f in robot.frames:
+            self._frame(f)
+
+    def _frame(self, f: Frame) -> None:
+        algebra, j = self.algebra, f.j
+        ca, sa = (algebra.constant(call(trig, f.alpha)) for trig in ("cos", "sin"))
+        cg, sg = (algebra.constant(call(trig, f.gamma)) for trig in ("cos", "sin"))
+        A: Matrix = ((cg, -mul(sg, ca), mul(sg, sa)), (sg, mul(cg, ca), -mul(cg, sa)), (0, sa, ca))
+        turn: Turn = ()
+        offset = f.theta0
+        if f.sigma == REVOLUTE:
+            turn, constant = self.closure.turn(j)
+            offset = offset + constant
+        parallel = not f.alpha
+        if parallel:
+            offset = offset + f.gamma
+        self.rotation[j] = self._rotation(None if parallel else A, turn, offset)
+        b, d, r = algebra.constant(f.b), algebra.constant(f.d), algebra.constant(f.r0)
+        if f.sigma == PRISMATIC:
+            r = algebra.name(add(r, self.position(j)), f"r{j}")
+        self.P[j] = (add(mul(d, cg), mul(r, A[0][2])), add(mul(d, sg), mul(r, A[1][2])), add(b, mul(r, A[2][2])))
+        if parallel and f.ant:
+            inner = self.carrier[f.ant]
+            turn, offset = _sum(self._turn[f.ant][0] + turn), self._turn[f.ant][1] + offset
+            self.carrier[j] = Carrier(inner.m, self._rotation(inner.rotation.A, turn, offset), turn)
+        else:
+            self.carrier[j] = Carrier(f.ant, self.rotation[j], turn)
+        self._turn[j] = (turn, offset)
+
+    def _rotation(self, A: Matrix | None, turn: Turn, offset: Expression) -> Rotation:
+        return Rotation(A, *self.algebra.cos_sin(turn, offset))
+
+    def position(self, j: int) -> Scalar:
+        """q_j of any moving joint, from the actuated ones."""
+        q = {i: self.algebra.q(i) for i in self.closure.row[j]}
+        return add(self.closure.linear(self.algebra, j, q), self.algebra.constant(self.closure.offset[j]))
+
+    def carried(self, j: int, v: Vector) -> Vector:
+        """Components in frame j of a vector given in the carrier's frame."""
+        return self.carrier[j].rotation.down(v) if v != ZERO3 else v
+
+    def is_inside(self, i: int, j: int) -> bool:
+        """Whether joint i turns the carrier of frame j (otherwise it turns about z_j itself)."""
+        return i in self.robot.path(self.carrier[j].m)
+
+
+def _sum(turn: Turn) -> Turn:
+    """Equal joints of a turn added up; what cancels is left out."""
+    total: dict[int, int] = {}
+    for j, n in turn:
+        total[j] = total.get(j, 0) + n
+    return tuple((j, n) for j, n in sorted(total.items()) if n)

@@ -1,0 +1,172 @@
+"""Hash-consed expression graph: the one intermediate representation between the recursions and every printer.
+
+A node is (op, operands); equal nodes are one object, so a shared sub-expression is computed once. Signs live on the edges: a
+`Scalar` is a node and a sign, negations are free and x and -x share everything. A node may carry a name given by the recursion that made it.
+Operations: sym, const (exact rational), add, mul, cos, sin, sign, pos (positive part max(x, 0)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from typing import Any
+
+SYM, CONST, ADD, MUL, COS, SIN, SIGN, POS = "sym", "const", "add", "mul", "cos", "sin", "sign", "pos"
+OPERATIONS = (ADD, MUL)
+
+
+class Node:
+    """One operation of the graph. `operands` are Scalars; `fixed` nodes depend on no sample (constants and parameters only)."""
+
+    __slots__ = ("fixed", "index", "name", "name_sign", "op", "operands", "value")
+
+    def __init__(self, index: int, op: str, operands: tuple[Scalar, ...], value: Any, fixed: bool) -> None:
+        self.index, self.op, self.operands, self.value, self.fixed = index, op, operands, value, fixed
+        self.name: str | None = None
+        self.name_sign = 1
+
+    def __repr__(self) -> str:
+        return f"<{self.name or self.value or self.op} {self.index}>"
+
+
+class Scalar:
+    """A node with a sign; + - * build the graph."""
+
+    __slots__ = ("graph", "node", "sign")
+
+    def __init__(self, graph: Graph, node: Node, sign: int) -> None:
+        self.graph, self.node, self.sign = graph, node, sign
+
+    def __neg__(self) -> Scalar:
+        return Scalar(self.graph, self.node, -self.sign)
+
+    def __add__(self, other: Scalar | int) -> Scalar | int:
+        return self.graph.add(self, self.graph.lift(other))
+
+    def __sub__(self, other: Scalar | int) -> Scalar | int:
+        return self.graph.add(self, -self.graph.lift(other))
+
+    def __mul__(self, other: Scalar | int) -> Scalar | int:
+        return self.graph.mul(self, self.graph.lift(other))
+
+    def __radd__(self, other: int) -> Scalar | int:
+        return self.graph.add(self.graph.lift(other), self)
+
+    def __rsub__(self, other: int) -> Scalar | int:
+        return self.graph.add(self.graph.lift(other), -self)
+
+    __rmul__ = __mul__
+
+    def __repr__(self) -> str:
+        return f"{'-' if self.sign < 0 else ''}{self.node!r}"
+
+
+class Graph:
+    """Owner of the nodes; two graphs never mix."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self._known: dict[tuple[Any, ...], Node] = {}
+
+    def symbol(self, name: str, *, fixed: bool = False) -> Scalar:
+        """An input of the emitted code; `fixed` if it is the same for all samples."""
+        return self._scalar((SYM, name), SYM, (), name, fixed)
+
+    def number(self, c: Fraction | int) -> Scalar | int:
+        """A constant; 0, 1 and -1 stay Python integers."""
+        c = Fraction(c)
+        if c in (0, 1, -1):
+            return int(c)
+        s = self._scalar((CONST, abs(c)), CONST, (), abs(c), True)
+        return s if c > 0 else -s
+
+    def lift(self, value: Scalar | int) -> Scalar:
+        if isinstance(value, Scalar):
+            return value
+        c = Fraction(value)
+        s = self._scalar((CONST, abs(c)), CONST, (), abs(c), True)
+        return s if c >= 0 else -s
+
+    def add(self, a: Scalar, b: Scalar) -> Scalar | int:
+        """a + b; the node is kept with its first operand positive, so that a - b and b - a are one node."""
+        if a.node is b.node:
+            return 0 if a.sign != b.sign else self.mul(self.lift(2), a)
+        for x, y in ((a, b), (b, a)):
+            if x.node.op == CONST and x.node.value == 0:
+                return y
+        if a.node.index > b.node.index:
+            a, b = b, a
+        key = (ADD, a.node.index, b.node.index, a.sign * b.sign)
+        b = b if a.sign > 0 else -b
+        s = self._scalar(key, ADD, (a if a.sign > 0 else -a, b), None, a.node.fixed and b.node.fixed)
+        return s if a.sign > 0 else -s
+
+    def mul(self, a: Scalar, b: Scalar) -> Scalar | int:
+        sign = a.sign * b.sign
+        for x, y in ((a, b), (b, a)):
+            if x.node.op == CONST:
+                if x.node.value == 0:
+                    return 0
+                if x.node.value == 1:
+                    return y if x.sign > 0 else -y
+                if y.node.op == CONST:
+                    return self.number(sign * x.node.value * y.node.value)
+        if a.node.index > b.node.index:
+            a, b = b, a
+        fixed = a.node.fixed and b.node.fixed
+        s = self._scalar((MUL, a.node.index, b.node.index), MUL, (_positive(a), _positive(b)), None, fixed)
+        return s if sign > 0 else -s
+
+    def cos(self, x: Scalar) -> Scalar:
+        return self._scalar((COS, x.node.index), COS, (_positive(x),), None, x.node.fixed)
+
+    def sin(self, x: Scalar) -> Scalar:
+        s = self._scalar((SIN, x.node.index), SIN, (_positive(x),), None, x.node.fixed)
+        return s if x.sign > 0 else -s
+
+    def sign(self, x: Scalar) -> Scalar:
+        s = self._scalar((SIGN, x.node.index), SIGN, (_positive(x),), None, x.node.fixed)
+        return s if x.sign > 0 else -s
+
+    def positive_part(self, x: Scalar) -> Scalar:
+        """max(x, 0)."""
+        return self._scalar((POS, x.node.index, x.sign), POS, (x,), None, x.node.fixed)
+
+    def name(self, value: Scalar | int, name: str) -> Scalar | int:
+        """Call an operation `name`; the first name holds, inputs and numbers keep theirs."""
+        if isinstance(value, Scalar) and value.node.name is None and value.node.op not in (SYM, CONST):
+            value.node.name, value.node.name_sign = name, value.sign
+        return value
+
+    def _scalar(self, key: tuple[Any, ...], op: str, operands: tuple[Scalar, ...], value: Any, fixed: bool) -> Scalar:
+        node = self._known.get(key)
+        if node is None:
+            node = Node(len(self.nodes), op, operands, value, fixed)
+            self._known[key] = node
+            self.nodes.append(node)
+        return Scalar(self, node, 1)
+
+
+def _positive(x: Scalar) -> Scalar:
+    return x if x.sign > 0 else -x
+
+
+def reachable(outputs: Iterable[Scalar | int]) -> list[Node]:
+    """Nodes that the outputs need, in order of creation (operands first)."""
+    seen: set[int] = set()
+    found: list[Node] = []
+    stack = [o.node for o in outputs if isinstance(o, Scalar)]
+    while stack:
+        node = stack.pop()
+        if node.index in seen:
+            continue
+        seen.add(node.index)
+        found.append(node)
+        stack.extend(x.node for x in node.operands)
+    return sorted(found, key=lambda n: n.index)
+
+
+def count_operations(outputs: Iterable[Scalar | int]) -> tuple[int, int]:
+    """(multiplications, additions) per sample: operations on constants and parameters alone happen once per call."""
+    nodes = [n for n in reachable(outputs) if not n.fixed]
+    return sum(n.op == MUL for n in nodes), sum(n.op == ADD for n in nodes)

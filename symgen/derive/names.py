@@ -1,0 +1,52 @@
+"""Families of named quantities, and how their indices are written.
+
+Order of indices: component digits, link, then the joint it belongs to: W12 is component 1 of link 2, U312 row 3 column 1 of
+link 2, Z132 component 1 in frame 3 of the axis of joint 2. With more than nine frames indices are separated: W1_12.
+"""
+
+from __future__ import annotations
+
+FAMILIES = {
+    "th": "joint angle with its constant, rad",
+    "C": "cosine of a joint angle or of a sum of angles",
+    "S": "sine of a joint angle or of a sum of angles",
+    "r": "position of a prismatic joint with its constant, m",
+    "QP": "joint velocity",
+    "QDP": "joint acceleration",
+    "W": "angular velocity of a link, in its frame",
+    "WP": "angular acceleration of a link, in its frame",
+    "DV": "products of angular velocity components W_k W_l",
+    "DW": "differences of their squares",
+    "U": "skew(WP) + skew(W)**2",
+    "VSP": "acceleration of the origin of a frame minus gravity, in the antecedent's frame",
+    "VP": "the same, in the frame itself",
+    "Z": "axis of a joint, in the frame of a later link",
+    "V": "velocity of a frame's origin per unit rate of a joint, in that frame",
+    "J": "inertia differences of the product form, constants",
+    "F": "force that moves a link",
+    "N": "moment that moves a link, about the origin of its frame",
+    "E": "force transmitted to a link by its antecedent, in its frame",
+    "NE": "moment transmitted to a link by its antecedent, about the origin of its frame",
+    "FDI": "the transmitted force, in the antecedent's frame",
+    "NDI": "the transmitted moment, in the antecedent's frame",
+    "SG": "direction of motion along an element, -1, 0 or 1",
+    "QE": "rate of motion along an element",
+    "QDE": "acceleration along an element",
+    "GAM": "joint torque or force",
+    "DG": "contribution of a base parameter to a joint torque",
+    "A": "entry of the inertia matrix",
+    "R": "orientation of a frame in frame 0",
+    "P": "origin of a frame in frame 0",
+}
+
+
+class Names:
+    """Writes indices for a robot of `n_frames` frames."""
+
+    def __init__(self, n_frames: int) -> None:
+        self.separator = "_" if n_frames > 9 else ""
+
+    def __call__(self, family: str, *indices: int) -> str:
+        if family not in FAMILIES:
+            raise KeyError(f"{family!r} is not a family of symgen/derive/names.py")
+        return family + self.separator.join(str(i) for i in indices)

@@ -1,0 +1,155 @@
+"""Newton-Euler, once: the motion of the links outward and the wrenches inward, over any scalars.
+
+Link j, frame j, i = ant(j), a_j the acceleration of O_j minus gravity, U = skew(wd) + skew(w)**2:
+
+    w_j  = iRj' w_i  + qd_j e3                          wd_j = iRj' wd_i + qdd_j e3 + (iRj' w_i) x (qd_j e3)      revolute
+    a_j  = iRj' (a_i + U_i P_ij)  [+ 2 w_j x (qd_j e3) + qdd_j e3   prismatic],        a_0 = -gravity
+    F_j  = M_j a_j + U_j MS_j ,     N_j = J_j wd_j + w_j x (J_j w_j) + MS_j x a_j
+    f_j  = F_j + sum_k jRk f_k ,    n_j = N_j + sum_k (jRk n_k + P_jk x jRk f_k) ,   k over the frames carried by j
+
+N_j is written in product form (see `moment`): with base parameters YY = MZ = M = 0, which is where the saving is.
+
+W. Khalil, J.-F. Kleinfinger, ICRA 1986; Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, ch. 9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from symgen.derive.geometry import Geometry
+from symgen.derive.names import Names
+from symgen.derive.scalar import ZERO3, Algebra, Matrix, Scalar, Vector, add, apply, cross, dot, mul, scale, sub, vadd
+from symgen.description.expression import Expression
+from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Robot, parameter
+
+ZERO33: Matrix = (ZERO3, ZERO3, ZERO3)
+TWO = Expression.number(2)
+
+
+@dataclass(frozen=True)
+class LinkMotion:
+    """Motion of one link, in its frame."""
+
+    w: Vector
+    wd: Vector
+    DV: Matrix  # w_k w_l
+    DW: Vector  # (w2**2 - w3**2, w3**2 - w1**2, w1**2 - w2**2)
+    U: Matrix
+    a: Vector
+
+
+class Motion:
+    """Outward recursion. `moving` are the joints that may have a velocity and an acceleration, by default all.
+
+    `gravity=False` leaves gravity out; the inertia matrix is this recursion at rest with one unit acceleration at a time.
+    """
+
+    def __init__(self, geometry: Geometry, *, gravity: bool = True, velocity: bool = True, acceleration: tuple[int, ...] | None = None) -> None:
+        self.geometry, self.robot, self.algebra = geometry, geometry.robot, geometry.algebra
+        self.named = Names(len(self.robot.frames))
+        self.gravity, self.velocity, self.acceleration = gravity, velocity, acceleration
+        self._qd = {i: self.algebra.qd(i) if velocity else 0 for i in self.robot.joints}
+        self._qdd = {i: self.algebra.qdd(i) if acceleration is None else int(i in acceleration) for i in self.robot.joints}
+        g = tuple(self.algebra.constant(-e) for e in self.robot.gravity) if gravity else ZERO3
+        self.link: dict[int, LinkMotion] = {0: LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, g)}  # type: ignore[arg-type]
+        for f in self.robot.frames:
+            self.link[f.j] = self._link(f.j)
+
+    def q(self, j: int) -> Scalar:
+        """Position of any moving joint; 0 where gravity, and so every force at rest, is left out."""
+        return self.geometry.position(j) if self.gravity else 0
+
+    def qd(self, j: int) -> Scalar:
+        """Velocity of any moving joint."""
+        return self.geometry.closure.linear(self.algebra, j, self._qd)
+
+    def qdd(self, j: int) -> Scalar:
+        """Acceleration of any moving joint."""
+        return self.geometry.closure.linear(self.algebra, j, self._qdd)
+
+    def vector(self, family: str, value: Vector, *indices: int) -> Vector:
+        """The same vector, its components named family + component + indices."""
+        x, y, z = (self.algebra.name(v, self.named(family, k, *indices)) for k, v in enumerate(value, start=1))
+        return x, y, z
+
+    def _link(self, j: int) -> LinkMotion:
+        f, geometry = self.robot.frame(j), self.geometry
+        carrier = geometry.carrier[j]
+        inner, i = self.link[carrier.m], self.link[f.ant]
+        rate: Scalar = 0
+        acceleration: Scalar = 0
+        for k, multiple in carrier.turn:
+            n = self.algebra.constant(Expression.number(multiple))
+            rate, acceleration = add(rate, mul(n, self._qd[k])), add(acceleration, mul(n, self._qdd[k]))
+        w0, wd0 = geometry.carried(j, inner.w), geometry.carried(j, inner.wd)
+        w = self.vector("W", (w0[0], w0[1], add(w0[2], rate)), j)
+        wd = self.vector("WP", (add(wd0[0], mul(w[1], rate)), sub(wd0[1], mul(w[0], rate)), add(wd0[2], acceleration)), j)
+        DV, DW, U = self._products(w, wd, j)
+        P = geometry.P[j]
+        VSP = self.vector("VSP", vadd(i.a, apply(i.U, P)), j)
+        a = geometry.rotation[j].down(VSP)
+        if f.sigma == PRISMATIC:
+            qd2 = mul(self.algebra.constant(TWO), self.qd(j))
+            a = (add(a[0], mul(qd2, w[1])), sub(a[1], mul(qd2, w[0])), add(a[2], self.qdd(j)))
+        return LinkMotion(w, wd, DV, DW, U, self.vector("VP", a, j))
+
+    def _products(self, w: Vector, wd: Vector, j: int) -> tuple[Matrix, Vector, Matrix]:
+        name, named = self.algebra.name, self.named
+        D = {(k, m): name(mul(w[k], w[m]), named("DV", k + 1, m + 1, j)) for k in range(3) for m in range(k, 3)}
+        DV: Matrix = tuple(tuple(D[min(k, m), max(k, m)] for m in range(3)) for k in range(3))  # type: ignore[assignment]
+        DW = tuple(name(sub(DV[k][k], DV[m][m]), named("DW", k + 1, m + 1, j)) for k, m in ((1, 2), (2, 0), (0, 1)))
+
+        def off(k: int, m: int, value: Scalar) -> Scalar:
+            return name(value, named("U", k, m, j))
+
+        U: Matrix = (
+            (off(1, 1, -add(DV[1][1], DV[2][2])), off(1, 2, sub(DV[0][1], wd[2])), off(1, 3, add(DV[0][2], wd[1]))),
+            (off(2, 1, add(DV[0][1], wd[2])), off(2, 2, -add(DV[0][0], DV[2][2])), off(2, 3, sub(DV[1][2], wd[0]))),
+            (off(3, 1, sub(DV[0][2], wd[1])), off(3, 2, add(DV[1][2], wd[0])), off(3, 3, -add(DV[0][0], DV[1][1]))),
+        )
+        return DV, DW, U  # type: ignore[return-value]
+
+
+def force(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
+    """F = M a + U MS."""
+    return vadd(scale(K["M"], m.a), apply(m.U, (K["MX"], K["MY"], K["MZ"])))
+
+
+def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
+    """N = J wd + w x (J w) + MS x a, in product form.
+
+    N1 = XX wd1 + (ZZ - YY) w2 w3 + YZ (w2**2 - w3**2) + XZ U21 - XY U31 + (MS x a)1, and cyclically.
+    """
+    (XX, XY, XZ, YY, YZ, ZZ), MS = (K[p] for p in INERTIAL[:6]), (K["MX"], K["MY"], K["MZ"])
+    DV, DW, U, wd = m.DV, m.DW, m.U, m.wd
+    N = (
+        dot((XX, sub(ZZ, YY), YZ, XZ, -XY), (wd[0], DV[1][2], DW[0], U[1][0], U[2][0])),
+        dot((YY, sub(XX, ZZ), XZ, XY, -YZ), (wd[1], DV[0][2], DW[1], U[2][1], U[0][1])),
+        dot((ZZ, sub(YY, XX), XY, YZ, -XZ), (wd[2], DV[0][1], DW[2], U[0][2], U[1][2])),
+    )
+    return vadd(N, cross(MS, m.a))
+
+
+def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
+    """Inward recursion: the part of Gamma_j that moves the links, for every moving joint of the tree.
+
+    K maps a standard parameter's name to its scalar; a parameter that is not in K counts as 0.
+    """
+    robot, geometry, vector = motion.robot, motion.geometry, motion.vector
+    f: dict[int, Vector] = dict.fromkeys(range(len(robot.frames) + 1), ZERO3)
+    n: dict[int, Vector] = dict(f)
+    torque: dict[int, Scalar] = {}
+    for frame in reversed(robot.frames):
+        j, i = frame.j, frame.ant
+        link = {p: K.get(parameter(p, j), 0) for p in INERTIAL}
+        f[j] = vector("E", vadd(vector("F", force(motion.link[j], link), j), f[j]), j)
+        n[j] = vector("NE", vadd(vector("N", moment(motion.link[j], link), j), n[j]), j)
+        if frame.sigma == REVOLUTE:
+            torque[j] = n[j][2]
+        elif frame.sigma == PRISMATIC:
+            torque[j] = f[j][2]
+        fi = vector("FDI", geometry.rotation[j].up(f[j]), j)
+        f[i] = vadd(f[i], fi)
+        n[i] = vadd(n[i], vadd(geometry.rotation[j].up(n[j]), cross(geometry.P[j], fi)))
+    return torque

@@ -1,0 +1,83 @@
+"""The regressor in axis form: Gamma_i = sum_k D_ik chi_k, column by column, without propagating a wrench.
+
+Joint i feels the unit wrench (F, N) of a parameter of link j through its own axis seen from frame j,
+
+    D_ik = z_ij . N_k + v_ij . F_k
+
+z_ij the axis of joint i in frame j, v_ij the velocity of O_j per unit rate of joint i; both are carried outward:
+z <- jRi' z, v <- jRi' (v + z x P). A prismatic joint has z = 0 and v = its direction.
+"""
+
+from __future__ import annotations
+
+from symgen.derive.newton_euler import LinkMotion, Motion
+from symgen.derive.scalar import E3, ZERO3, Scalar, Vector, add, cross, dot, vadd
+from symgen.description.robot import FIXED, REVOLUTE
+
+
+def unit_wrench(m: LinkMotion, parameter: str) -> tuple[Vector, Vector]:
+    """(F, N) of a link whose only inertial parameter is `parameter` = 1."""
+    (w1, w2, w3), DV, DW, U, a = m.wd, m.DV, m.DW, m.U, m.a
+    match parameter:
+        case "XX":
+            return ZERO3, (w1, DV[0][2], -DV[0][1])
+        case "XY":
+            return ZERO3, (-U[2][0], U[2][1], DW[2])
+        case "XZ":
+            return ZERO3, (U[1][0], DW[1], -U[1][2])
+        case "YY":
+            return ZERO3, (-DV[1][2], w2, DV[0][1])
+        case "YZ":
+            return ZERO3, (DW[0], -U[0][1], U[0][2])
+        case "ZZ":
+            return ZERO3, (DV[1][2], -DV[0][2], w3)
+        case "MX":
+            return (U[0][0], U[1][0], U[2][0]), (0, -a[2], a[1])
+        case "MY":
+            return (U[0][1], U[1][1], U[2][1]), (a[2], 0, -a[0])
+        case "MZ":
+            return (U[0][2], U[1][2], U[2][2]), (-a[1], a[0], 0)
+        case "M":
+            return a, ZERO3
+    raise KeyError(parameter)
+
+
+class Axes:
+    """z_ij and v_ij of every joint i on the path to link j."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.motion = motion
+        self.z: dict[tuple[int, int], Vector] = {}
+        self.v: dict[tuple[int, int], Vector] = {}
+        for f in motion.robot.frames:
+            self._carry(f.j)
+
+    def _carry(self, j: int) -> None:
+        motion, geometry, robot = self.motion, self.motion.geometry, self.motion.robot
+        frame = robot.frame(j)
+        m = geometry.carrier[j].m
+        for i in robot.path(j)[:-1]:
+            sigma = robot.frame(i).sigma
+            if sigma == FIXED:
+                continue
+            inside = geometry.is_inside(i, j)
+            if sigma == REVOLUTE:
+                z = geometry.carried(j, self.z[i, m]) if inside else E3
+                lever = vadd(self.v[i, frame.ant], cross(self.z[i, frame.ant], geometry.P[j]))
+                v = geometry.rotation[j].down(lever)
+            else:
+                z = ZERO3
+                v = geometry.carried(j, self.v[i, m]) if inside else E3
+            self.z[i, j] = motion.vector("Z", z, j, i)
+            self.v[i, j] = motion.vector("V", v, j, i)
+        if frame.sigma != FIXED:
+            self.z[j, j], self.v[j, j] = (E3, ZERO3) if frame.sigma == REVOLUTE else (ZERO3, E3)
+
+    def column(self, parameter: str, j: int) -> dict[int, Scalar]:
+        """{i: D_ik} of an inertial parameter of link j, i over the moving joints that carry it."""
+        F, N = unit_wrench(self.motion.link[j], parameter)
+        path = [i for i in self.motion.robot.path(j) if self.motion.robot.frame(i).sigma != FIXED]
+        return {i: add(dot(self.z[i, j], N), dot(self.v[i, j], F)) for i in path}
+
+
+

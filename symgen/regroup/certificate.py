@@ -1,0 +1,88 @@
+"""The certificate of a regrouping: exact rank and identities over F_p at fresh geometry, numeric rank of an independent regressor.
+
+With fresh random lengths and states, for two primes,
+
+    D_chi = sum_k coefficient_k,chi D_base,k   for every standard parameter chi,      rank_p(D_base) = number of base parameters.
+
+The rank over F_p is never above the generic rank, so equality proves that no further relation exists; a false identity survives
+one state with probability at most degree/p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+from symgen.regroup.finite_field import Array, Draw, Fp, angle_denominators, primes_for, rref
+from symgen.regroup.regrouping import Regrouping
+from symgen.regroup.solve import sample, states_for
+
+PI = (("pi", 1),)
+Sampler = Callable[[Draw, tuple[str, ...]], Array]
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What was checked and what did not hold; `valid` if nothing failed."""
+
+    count: int
+    rank: int
+    primes: tuple[int, ...]
+    identities: int
+    failures: tuple[str, ...]
+
+    @property
+    def valid(self) -> bool:
+        return not self.failures
+
+    def mapping(self) -> dict[str, object]:
+        return {
+            "valid": self.valid, "count": self.count, "rank": self.rank, "primes": list(self.primes),
+            "identities": self.identities, "failures": list(self.failures),
+        }
+
+
+def certify(regrouping: Regrouping, *, seed: int = 101, sampler: Sampler = sample) -> Certificate:
+    """Check every formula of `regrouping`. `sampler` gives the standard regressor over F_p (a test may pass a wrong one)."""
+    robot = regrouping.robot
+    primes = primes_for(angle_denominators(robot)[PI], 2)
+    failures: list[str] = []
+    ranks: list[int] = []
+    for k, p in enumerate(primes):
+        draw = Draw(robot, seed + k, states_for(robot, len(regrouping)), p=p)
+        W = sampler(draw, robot.parameters)
+        index = {name: c for c, name in enumerate(robot.parameters)}
+        base = W[:, [index[name] for name in regrouping.own]]
+        ranks.append(len(rref(base, p)[0]))
+        if ranks[-1] != len(regrouping):
+            failures.append(f"rank modulo {p} is {ranks[-1]}, not {len(regrouping)}: the base columns are dependent")
+        failures += _false_identities(regrouping, draw, W, index, base)
+    return Certificate(len(regrouping), min(ranks), primes, len(robot.parameters), tuple(failures))
+
+
+def _false_identities(regrouping: Regrouping, draw: Draw, W: Array, index: dict[str, int], base: Array) -> list[str]:
+    p = draw.p
+    predicted = np.zeros_like(W)
+    for k, b in enumerate(regrouping.base):
+        for name, coefficient in b.combination.items():
+            c = draw.constant(coefficient)
+            residue = int(c.x[0]) if isinstance(c, Fp) else c % p
+            column = index[name]
+            predicted[:, column] = (predicted[:, column] + base[:, k] * residue) % p
+    wrong = np.flatnonzero((predicted != W).any(axis=0))
+    return [f"column of {regrouping.robot.parameters[c]} is not what the formulas say (modulo {p})" for c in wrong]
+
+
+def numeric_rank(W: Array, *, tolerance: float = 1e-9) -> tuple[int, float]:
+    """Rank of a float matrix by SVD after scaling its columns, and the gap s_rank / s_(rank+1)."""
+    norms = np.linalg.norm(W, axis=0)
+    s = np.linalg.svd(W[:, norms > 0] / norms[norms > 0], compute_uv=False)
+    rank = int(np.sum(s > tolerance * s[0]))
+    gap = float(s[rank - 1] / max(s[rank], np.finfo(float).tiny)) if rank < s.size else float("inf")
+    return rank, gap
+
+
+

@@ -1,0 +1,164 @@
+"""Base parameters with their regrouping formulas, exact.
+
+General rules over Q(geometry) remove most columns; rank and base choice come from the echelon form over F_p with the columns in
+Khalil's order of preference; the few particular relations left are solved exactly; a certificate checks the whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from symgen.derive.columns import element_names, inertial_names
+from symgen.description.expression import ONE, ZERO, Expression
+from symgen.description.robot import PRISMATIC, Robot
+from symgen.regroup.finite_field import Draw, rref, small_rational
+from symgen.regroup.rules import Combination, Step, Transfer
+from symgen.regroup.solve import Relation, sample, states_for
+
+FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
+LAST_CHOICE = ("MZ", "M", "YY")
+
+
+@dataclass(frozen=True)
+class BaseParameter:
+    """X = own + sum_k coefficient_k chi_k: `combination` maps standard parameters to coefficients, own first."""
+
+    name: str
+    own: str
+    combination: Mapping[str, Expression]
+
+    @property
+    def formula(self) -> str:
+        return formula(self.combination)
+
+
+@dataclass(frozen=True)
+class Regrouping:
+    """The base parameters of a robot in the order of eq. (4), and the standard parameters without effect."""
+
+    robot: Robot
+    base: tuple[BaseParameter, ...]
+    no_effect: tuple[str, ...]
+    steps: tuple[Step, ...] = field(repr=False, default=())  # recursive form: (from, into, coefficient)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(b.name for b in self.base)
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        return tuple(b.own for b in self.base)
+
+    def __len__(self) -> int:
+        return len(self.base)
+
+
+def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
+    """Derive the base parameters of `robot`. `seed` changes the random draws, never the result."""
+    transfer = Transfer(robot)
+    names = preference(robot, transfer.kept)
+    samples = states_for(robot, len(names))
+    draw = Draw(robot, seed, samples)
+    pivots, R = rref(sample(draw, names), draw.p)
+    base = tuple(names[c] for c in pivots)
+    combination: dict[str, Combination] = {name: transfer.combination[name] for name in base}
+    steps = list(transfer.steps)
+    for c in sorted(set(range(len(names))) - set(pivots)):
+        support = tuple(base[k] for k in range(len(base)) if R[k, c])
+        residues = [int(x) for x in R[:, c] if x]
+        for target, beta in zip(support, _coefficients(robot, names[c], support, residues, draw.p, seed), strict=True):
+            steps.append((names[c], target, beta))
+            into = combination[target]
+            for name, value in transfer.combination[names[c]].items():
+                into[name] = into.get(name, ZERO) + beta * value
+    return _assemble(robot, combination, steps)
+
+
+def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Columns in the order in which they may become base parameters."""
+    inertial, elements = inertial_names(robot), element_names(robot)
+
+    def rank(name: str) -> tuple[int, int, int]:
+        position = robot.parameters.index(name)
+        if name in elements:
+            e, j = elements[name]
+            passive = j in robot.passive
+            return (3 if e.kind == "inertia" else int(passive), position, 0)
+        family, j = inertial[name]
+        if family in FIRST_CHOICE:
+            return (2, j, FIRST_CHOICE.index(family))
+        if family == "M" and robot.frame(j).sigma == PRISMATIC:
+            return (2, j, len(FIRST_CHOICE))
+        return (4, j, LAST_CHOICE.index(family))
+
+    return tuple(sorted(names, key=rank))
+
+
+def _coefficients(robot: Robot, dependent: str, support: tuple[str, ...], residues: list[int], p: int, seed: int) -> list[Expression]:
+    if not support:
+        return []
+    relation = Relation(robot, dependent, support)
+    fresh = relation.residues(Draw(robot, seed + 1, states_for(robot, len(support) + 1)))
+    constants = [small_rational(x, p) if x == y else None for x, y in zip(residues, fresh, strict=True)]
+    if all(c is not None for c in constants):
+        return [Expression.number(c) for c in constants if c is not None]
+    return relation.monomials() or relation.exact()
+
+
+def _assemble(robot: Robot, combination: dict[str, Combination], steps: list[Step]) -> Regrouping:
+    order = {name: k for k, name in enumerate(robot.parameters)}
+    base: list[BaseParameter] = []
+    used: set[str] = set()
+    for own in sorted(combination, key=order.__getitem__):
+        terms = {name: simplified(c) for name, c in combination[own].items()}
+        terms = {name: c for name, c in sorted(terms.items(), key=lambda nc: (nc[0] != own, order[nc[0]])) if c}
+        used |= set(terms)
+        base.append(BaseParameter(own if terms == {own: ONE} else own + "R", own, terms))
+    no_effect = tuple(name for name in robot.parameters if name not in used)
+    return Regrouping(robot, tuple(base), no_effect, tuple(steps))
+
+
+def simplified(e: Expression) -> Expression:
+    """cos(a)**2 m + sin(a)**2 m = m wherever both are there with one coefficient."""
+    from symgen.description.expression import Call
+
+    changed = True
+    while changed:
+        changed = False
+        for m, c in e.terms.items():
+            for a, n in m:
+                if isinstance(a, Call) and a.function == "cos" and n >= 2:
+                    rest = tuple((b, k - 2 if b == a else k) for b, k in m if b != a or k > 2)
+                    cosine, common = Expression({m: c}), Expression({rest: c})
+                    sine = common * Expression({((Call("sin", a.argument), 2),): ONE.terms[()]})
+                    ((partner, value),) = sine.terms.items()
+                    if e.terms.get(partner) == value:
+                        e, changed = e - cosine - sine + common, True
+                        break
+            if changed:
+                break
+    return e
+
+
+def formula(combination: Mapping[str, Expression]) -> str:
+    """Text of sum_k c_k chi_k in the grammar of robot files; parameters with one coefficient share it, as in eq. (27)."""
+    groups: dict[Expression, list[str]] = {}
+    for name, c in combination.items():
+        key = c if not (-c in groups and c not in groups) else -c
+        groups.setdefault(key, []).append(name if key == c else "-" + name)
+    text = ""
+    for c, names in groups.items():
+        inner = names[0] + "".join(f" - {n[1:]}" if n.startswith("-") else f" + {n}" for n in names[1:])
+        term = _term(c, inner, len(names) > 1)
+        text = term if not text else text + (f" - {term[1:]}" if term.startswith("-") else f" + {term}")
+    return text
+
+
+def _term(c: Expression, inner: str, several: bool) -> str:
+    if c == ONE:
+        return inner
+    if c == -ONE:
+        return f"-({inner})" if several else f"-{inner}"
+    factor = str(c) if len(c.terms) == 1 else f"({c})"
+    return f"{factor}*({inner})" if several else f"{factor}*{inner}"
