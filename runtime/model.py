@@ -1,19 +1,28 @@
 """The border to emitted modules: what they offer, how one is found and checked, and checks of the states given to it.
 
-A model is a plain Python module written by the generator (NumPy only). A module given by path is parsed before it runs: it may hold constants,
-functions and classes over numpy and nothing else, so that a file received from elsewhere cannot act behind its formulas.
+A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` reads generated/tx40.py of the current folder. A
+module given by path is parsed before it runs (`runtime.model_source`), so that a file received from elsewhere cannot act behind its formulas.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from typing import Any, Protocol
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol, cast
 
 import numpy as np
 
-from runtime.errors import InputError
+from runtime.drives import Drives
+from runtime.errors import InputError, ModelError
+from runtime.model_source import module_of
 
 Array = np.ndarray
+
+FOLDER = Path("generated")  # of the current folder
+CONSTANTS = ("NAME", "JOINTS", "BASE_PARAMETERS", "STRUCTURE", "DRIVES", "LIMITS", "VALUES", "CONSTANTS", "SOURCE_SHA256")
+FUNCTIONS = ("store", "regressor", "observation_matrix")  # what identification needs; `require` checks others where they are used
 
 
 class GeneratedModel(Protocol):
@@ -37,6 +46,66 @@ class GeneratedModel(Protocol):
 
     def observation_matrix(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
         """W, shape (n*N, b), rows joint-major, Fortran order, eq. (6)."""
+
+
+def load_model(model: str | Path | ModuleType, *, folder: Path | None = None) -> GeneratedModel:
+    """The model of a name (generated/NAME.py), of a path to a .py file, or of an imported module, checked before use.
+
+    folder : where names are looked up; default: ./generated.
+    """
+    if isinstance(model, ModuleType):
+        return checked_model(model)
+    path = Path(model)
+    if isinstance(model, str) and re.fullmatch(r"\w+", model):
+        path = (folder or FOLDER) / f"{model}.py"
+    if not path.is_file():
+        present = sorted(p.stem for p in path.parent.glob("*.py") if p.stem != "__init__") if path.parent.is_dir() else []
+        raise ModelError(
+            f"no emitted model {path}; {path.parent} holds {', '.join(present) or 'none'}: emit it with `symgen generate {path.stem}`"
+        )
+    return checked_model(module_of(path))
+
+
+def checked_model(module: ModuleType) -> GeneratedModel:
+    """The module itself if it is an emitted model with n, b and shapes that agree; ModelError otherwise."""
+    label = module.__name__
+    missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
+    if missing:
+        raise ModelError(f"no {', '.join(missing)}; expected an emitted model, emit it again", file=label)
+    model = cast(GeneratedModel, module)
+    require(model, *FUNCTIONS)
+    n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
+    if n == 0 or b == 0 or len(set(model.BASE_PARAMETERS)) != b:
+        raise ModelError(
+            f"{n} joints and {b} base parameters {model.BASE_PARAMETERS}; expected at least one of each, names once", file=label
+        )
+    structure = np.asarray(model.STRUCTURE)
+    if structure.shape != (b, n) or structure.dtype != np.bool_:
+        raise ModelError(f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, n)}, base parameters by joints", file=label)
+    if model.DRIVES is not None and Drives.from_mapping(model.DRIVES).n != n:
+        raise ModelError(f"DRIVES of {len(model.DRIVES['ratio'])} joints; expected {n}", file=label)
+    _check_store(model, b, n, label)
+    return model
+
+
+def require(model: GeneratedModel, *functions: str) -> None:
+    """Raise ModelError unless the model offers all the named functions."""
+    missing = [name for name in functions if not callable(getattr(model, name, None))]
+    if missing:
+        raise ModelError(f"no function {', '.join(missing)}; emit the model again with the target that has them", file=model.NAME)
+
+
+def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
+    """One sample at rest through `store` and `observation_matrix`."""
+    N = 2
+    rest = np.zeros((N, n))
+    shape = np.shape(model.store(N))
+    if shape != (b, n, N):
+        raise ModelError(f"store({N}) has shape {shape}; expected {(b, n, N)}", file=label)
+    with np.errstate(all="ignore"):
+        shapes = np.shape(model.regressor(rest, rest, rest)), np.shape(model.observation_matrix(rest, rest, rest))
+    if shapes != ((N, n, b), (n * N, b)):
+        raise ModelError(f"regressor {shapes[0]}, observation_matrix {shapes[1]}; expected {(N, n, b)} and {(n * N, b)}", file=label)
 
 
 def check_states(model: GeneratedModel, q: Array, qd: Array, qdd: Array) -> None:
