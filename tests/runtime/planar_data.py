@@ -4,6 +4,10 @@ import numpy as np
 import planar_2r_model as planar
 
 from runtime.observation import Observation
+from runtime.study import EstimateSettings
+
+OLS = EstimateSettings()
+WLS = EstimateSettings(method="wls")
 
 TRUE = np.array([1.8, 2.4, 0.15, 6.0, 4.0, 0.35, 0.9, -0.08, 2.0, 1.5])
 """Parameters in the order of planar.BASE_PARAMETERS, SI."""
@@ -17,6 +21,14 @@ def motion(t):
     q = (amplitude * np.sin(phase)).sum(-1)
     qd = (amplitude * pulsation * np.cos(phase)).sum(-1)
     qdd = -(amplitude * pulsation**2 * np.sin(phase)).sum(-1)
+    return q, qd, qdd
+
+
+def one_joint_at_rest(t):
+    """The same motion with joint 2 at rest at q2 = 0."""
+    q, qd, qdd = motion(t)
+    for x in (q, qd, qdd):
+        x[:, 1] = 0
     return q, qd, qdd
 
 

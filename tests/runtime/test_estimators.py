@@ -7,7 +7,7 @@ import planar_2r_model as planar
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from planar_data import TRUE, motion, observation
+from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 from scipy.signal import lfilter
 
 from runtime.errors import SettingsError
@@ -17,8 +17,6 @@ from runtime.estimators.solution import null_groups, solve
 from runtime.estimators.triangular import combine, factor
 from runtime.study import EstimateSettings
 
-OLS = EstimateSettings()
-WLS = EstimateSettings(method="wls")
 EVERY = [OLS, WLS, EstimateSettings(method="wls", weights="iterated"), EstimateSettings(method="wls", weights="covariance")]
 KINDS = ["ols", "wls", "wls iterated", "wls covariance"]
 
@@ -168,13 +166,6 @@ def test_parts_combine_to_the_whole():
     assert both.rows == whole.rows
     assert np.allclose(solve(both).X, X, rtol=1e-10)
     assert np.allclose([j.residual_norm(X) for j in both.joints], [j.residual_norm(X) for j in whole.joints], rtol=1e-10)
-
-
-def one_joint_at_rest(t):
-    q, qd, qdd = motion(t)
-    for x in (q, qd, qdd):
-        x[:, 1] = 0
-    return q, qd, qdd
 
 
 @pytest.mark.parametrize("settings", EVERY[:3], ids=KINDS[:3])

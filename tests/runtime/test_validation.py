@@ -1,0 +1,90 @@
+"""Direct comparison, cross-validation, weak directions."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import planar_2r_model as planar
+import pytest
+from planar_data import TRUE, motion, observation
+
+from runtime.errors import InputError
+from runtime.estimators import estimate
+from runtime.study import EstimateSettings
+from runtime.validation import cross_validation, direct_comparison, split_validation, weak_directions
+
+
+def test_comparison_holds_the_torques_of_every_joint():
+    seen = observation(noise=(0.3, 0.05), seed=1)
+    found = estimate(seen, model=planar)
+    compared = direct_comparison(seen, found)
+    assert [joint.joint for joint in compared] == ["1", "2"]
+    assert np.isclose(compared.relative_error, found.relative_error)
+    for j, joint in enumerate(compared):
+        assert np.array_equal(joint.measured, seen.Y[seen.joint(j)])
+        assert np.array_equal(joint.t, seen.t[seen.joint(j)])
+        assert np.isclose(joint.relative_error, found.per_joint[j].relative_error)
+        assert np.isclose(np.linalg.norm(joint.error), found.per_joint[j].residual_norm)
+
+
+def test_comparison_uses_the_columns_of_the_estimate():
+    seen = observation(noise=(0.3, 0.05), seed=1)
+    found = estimate(seen, EstimateSettings(columns=("MX1R", "FS2", "FV1")))
+    predicted = np.concatenate([joint.predicted for joint in direct_comparison(seen, found)])
+    assert np.allclose(predicted, seen.W[:, [1, 9, 3]] @ found.X)
+    with pytest.raises(InputError, match="FS2"):
+        direct_comparison(seen.columns(("MX1R", "FV1")), found)
+
+
+def test_other_records_are_predicted():
+    fit = observation(noise=(0.3, 0.05), seed=1)
+    other = observation(noise=(0.3, 0.05), seed=2, motion=lambda t: motion(1.3 * t + 5))
+    result = cross_validation(fit, {"second": other}, essential=("MX1R", "FV1", "FS1", "MX2", "FV2", "FS2", "ZZ1R"))
+    assert [(p.part, p.columns, p.count, p.fitted) for p in result.predictions] == [
+        ("fit", "all", 10, True),
+        ("second", "all", 10, False),
+        ("fit", "essential", 7, True),
+        ("second", "essential", 7, False),
+    ]
+    found = estimate(fit)
+    assert np.isclose(result.predictions[0].relative_error, found.relative_error)
+    expected = 100 * np.linalg.norm(other.Y - other.W @ found.X) / np.linalg.norm(other.Y)
+    assert np.isclose(result.predictions[1].relative_error, expected)
+    assert result.predictions[1].relative_error < 1.5 * result.predictions[0].relative_error
+    assert "predicted" in str(result) and json.loads(result.to_json())["joints"] == ["1", "2"]
+
+
+def test_windows_of_one_record():
+    seen = observation(noise=(0.3, 0.05), seed=1)
+    result = split_validation(seen, [(0, 5), (5.01, None)])
+    assert [p.part for p in result.predictions] == ["[0, 5] s", "[5.01, ] s"]
+    found = estimate(seen.between(0, 5))
+    late = seen.between(5.01, None)
+    assert np.isclose(result.predictions[1].relative_error, 100 * np.linalg.norm(late.Y - late.W @ found.X) / np.linalg.norm(late.Y))
+    with pytest.raises(InputError, match="at least two"):
+        split_validation(seen, [(0, 5)])
+
+
+def test_parameters_that_trade_are_named():
+    seen = observation(noise=(0.3, 0.05), seed=1)
+    W = seen.W.copy()
+    rng = np.random.default_rng(0)
+    W[:, 2] = 40 * W[:, 1] + 0.1 * rng.standard_normal(len(W))  # MY1 nearly as MX1R
+    found = weak_directions(replace(seen, W=W, Y=W @ TRUE))
+    assert (found.pairs[0].first, found.pairs[0].second) == ("MX1R", "MY1")
+    assert found.pairs[0].correlation < -0.999
+    assert ("MX1R", "MY1") in found.groups
+    assert set(found.directions[0].weights) == {"MX1R", "MY1"}
+    assert found.directions[0].ratio < 1e-3
+    assert np.isclose(sum(w**2 for w in found.directions[0].weights.values()), 1, atol=1e-3)
+    assert "MX1R MY1" in str(found)
+    json.loads(found.to_json())
+
+
+def test_correlations_are_those_of_the_covariance():
+    seen = observation(noise=(0.3, 0.05), seed=1)
+    found = weak_directions(seen, EstimateSettings(method="wls"), threshold=0.2)
+    C = estimate(seen, EstimateSettings(method="wls")).covariance
+    for pair in found.pairs:
+        i, k = seen.names.index(pair.first), seen.names.index(pair.second)
+        assert np.isclose(pair.correlation, C[i, k] / np.sqrt(C[i, i] * C[k, k]))
