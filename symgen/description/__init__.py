@@ -1,6 +1,7 @@
 """What a user writes: robot files, read into the frozen Robot."""
 
 from symgen.description.expression import Expression, parse
+from symgen.description.new import skeleton
 from symgen.description.robot import Drives, Element, Frame, Loop, Robot
 from symgen.description.schema import json_schema
 from symgen.description.yaml import load_robot, packaged_robots, parse_robot
@@ -17,4 +18,5 @@ __all__ = [
     "packaged_robots",
     "parse",
     "parse_robot",
+    "skeleton",
 ]

@@ -18,8 +18,8 @@ def build(table: RobotFile, *, file: str, sha256: str) -> Robot:
     """The Robot of a robot file; DescriptionError carries the path of the field at fault."""
     constants = set(table.constants)
     joints = {j for j, row in table.frames.items() if row.sigma != FIXED}
-    variables = constants | {f"q{j}" for j in joints}
-    frames = tuple(_frame(j, row, constants) for j, row in sorted(table.frames.items()))
+    variables = constants | {f"q{j}" for j in (*joints, *range(1, len(table.frames) + 1))}
+    frames = tuple(_frame(j, row, constants, variables) for j, row in sorted(table.frames.items()))
     actuated = tuple(f.j for f in frames if f.mu)
     gx, gy, gz = (_read(text, constants, ("gravity", k)) for k, text in enumerate(table.gravity))
     for k, j in enumerate(table.massless):
@@ -60,10 +60,10 @@ def _joint(q: str, path: Path) -> int:
     return int(q[1:])
 
 
-def _frame(j: int, row: FrameRow, constants: set[str]) -> Frame:
+def _frame(j: int, row: FrameRow, constants: set[str], variables: set[str]) -> Frame:
     mu = row.mu if row.mu is not None else int(row.sigma != FIXED)
     fields = {
-        name: _read(getattr(row, name), constants | ({f"q{j}"} if name in ("theta", "r") else set()), ("frames", j, name))
+        name: _read(getattr(row, name), variables | {f"q{j}"} if name in ("theta", "r") else constants, ("frames", j, name))
         for name in ("gamma", "b", "alpha", "d", "theta", "r")
     }
     return Frame(j, row.ant, row.sigma, mu, **fields)

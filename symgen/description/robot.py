@@ -305,10 +305,15 @@ def _check_geometry(robot: Robot) -> None:
         for name in ("gamma", "b", "alpha", "d", "theta", "r"):
             where = ("frames", f.j, name)
             e: Expression = getattr(f, name)
-            variable = {f.q} if (name, f.sigma) in {("theta", REVOLUTE), ("r", PRISMATIC)} else set()
-            _declared(robot, e, where, variable)
-            if variable and (e.coefficient(f.q) != ONE or f.q in (e - Expression.symbol(f.q)).symbols):
+            variable = (name, f.sigma) in {("theta", REVOLUTE), ("r", PRISMATIC)}
+            if variable and (e.coefficient(f.q) != ONE or _moves(e - Expression.symbol(f.q))):
                 raise DescriptionError(f"frame {f.j}: {name} = {e}; expected {f.q} once, as {f.q} or {f.q} + constant", path=where)
+            if not variable and _moves(e):
+                raise DescriptionError(
+                    f"frame {f.j}: {name} = {e}; a joint position stands in theta if sigma is 0, in r if sigma is 1, nowhere else",
+                    path=where,
+                )
+            _declared(robot, e, where, {f.q} if variable else set())
 
 
 def _check_element(robot: Robot, e: Element) -> None:

@@ -38,10 +38,18 @@ def _number(value: Any) -> float:
     return number
 
 
+def _interval(value: Any) -> tuple[float, float]:
+    if isinstance(value, list):
+        if len(value) != 2:
+            raise ValueError("expected [lower, upper], or one number for +- that number")
+        return _number(value[0]), _number(value[1])
+    return -_number(value), _number(value)
+
+
 _TEXT_OR_NUMBER = WithJsonSchema({"type": ["number", "string"]})
 Symbolic = Annotated[str, BeforeValidator(_symbolic), _TEXT_OR_NUMBER]
 Number = Annotated[float, BeforeValidator(_number), _TEXT_OR_NUMBER]
-Interval = Annotated[tuple[Number, Number], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else (f"-({_symbolic(v)})", v))]
+Interval = Annotated[tuple[float, float], BeforeValidator(_interval), WithJsonSchema({"type": ["number", "string", "array"]})]
 
 
 class _Table(BaseModel):
@@ -128,32 +136,29 @@ _EXPECTED = {
     "dict_type": "a table {key: value}",
     "model_type": "a table {key: value}",
     "list_type": "a list [a, b, ...]",
-    "tuple_type": "a list [lower, upper]",
     "literal_error": "`all` or a table such as {1: q1}",
 }
 
 
 def explain(error: ValidationError) -> tuple[str, Path]:
-    """Message and path of the first thing that is wrong."""
-    first = error.errors(include_url=False)[0]
-    path = tuple(
-        key for key in first["loc"] if key != "[key]" and not str(key).startswith(("dict[", "list[", "tuple[", "literal[", "function-"))
-    )
-    place = ".".join(str(key) for key in path) or "robot file"
-    given = repr(first["input"])
-    given = given if len(given) <= 60 else given[:60] + " ..."
-    if first["type"] == "extra_forbidden":
+    """Message and path of the first thing that is wrong; a misspelt key comes before the one it leaves missing."""
+    first = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
+    path = tuple(key for key in first["loc"] if key != "[key]" and not str(key).startswith(("dict[", "list[", "literal[", "function-")))
+    place, kind = ".".join(str(key) for key in path) or "robot file", first["type"]
+    if kind == "extra_forbidden":
         keys = _keys(path[:-1])
         close = difflib.get_close_matches(str(path[-1]), keys, 1)
         hint = f"; did you mean {close[0]!r}?" if close else ""
         return f"{place}: unknown key {path[-1]!r}; expected {', '.join(keys)}{hint}", path
-    if first["type"] == "missing":
+    if kind == "missing":
         return f"{'.'.join(str(key) for key in path[:-1]) or 'robot file'}: key {path[-1]!r} is missing; add it", path[:-1]
-    if first["type"] in ("too_short", "too_long", "missing_positional_only_argument", "unexpected_positional_argument"):
-        return f"{place}: found {given}; {first['msg'].removeprefix('List').removeprefix('Tuple').strip()}", path
-    if first["loc"][-1:] == ("[key]",):
-        given = repr(path[-1])
-    expected = _EXPECTED.get(first["type"])
+    given = repr(first["input"])
+    if len(given) > 60:
+        given = given[:60] + " ..."
+    if kind in ("too_short", "too_long"):
+        limits = first["ctx"]
+        return f"{place}: found {given}; expected {limits.get('min_length', limits.get('max_length'))} entries", path
+    expected = "a name" if kind == "string_type" and first["loc"][-1] == "[key]" else _EXPECTED.get(kind)
     text = f"expected {expected}" if expected else first["msg"].removeprefix("Value error, ")
     return f"{place}: found {given}; {text}", path
 

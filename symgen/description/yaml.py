@@ -33,7 +33,7 @@ from symgen.description.robot import Robot
 from symgen.description.schema import SCHEMA, RobotFile, explain
 from symgen.errors import DescriptionError
 
-MAX_BYTES, MAX_NESTING, MAX_SCALAR = 1_000_000, 12, 4000
+MAX_BYTES, MAX_NESTING, MAX_SCALAR = 200_000, 12, 4000
 
 _INTEGER = re.compile(r"[-+]?[0-9]{1,15}\Z")
 _DECIMAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]{1,3})?\Z")

@@ -1,0 +1,46 @@
+"""The robot file a newcomer starts from."""
+
+from __future__ import annotations
+
+from symgen.description.robot import check_identifier
+from symgen.description.schema import SCHEMA
+
+_SKELETON = """\
+# {name}: a robot file. Replace the two joints below by yours; everything after `frames` may be left out.
+symgen: {schema}                          # version of this format
+name: {name}
+title: Two revolute joints in a vertical plane
+source: where the table below comes from
+gravity: [0, -g, 0]                # acceleration of gravity in frame 0, m/s^2: here y0 is up
+constants: {{D2: 0.5, g: 9.81}}      # SI and rad; they stay symbols in all formulas
+
+# One row per frame, modified Denavit-Hartenberg (Khalil and Kleinfinger 1986), from frame `ant` to frame j:
+#     Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) ;  gamma and b are 0 if left out.
+# sigma: 0 revolute (theta: q1, or q1 + constant), 1 prismatic (r: q1), 2 fixed.
+frames:
+  1: {{ant: 0, sigma: 0, alpha: 0, d: 0,  theta: q1, r: 0}}
+  2: {{ant: 1, sigma: 0, alpha: 0, d: D2, theta: q2, r: 0}}
+
+# What acts on the joints besides the links. kind: inertia, viscous, coulomb, offset or stiffness.
+# along: all, or {{2: q1 + q2}} for a motor that turns with two joints; viscous and coulomb also take `when: positive` or `negative`.
+elements:
+  Ia:     {{kind: inertia, along: all}}
+  FV:     {{kind: viscous, along: all}}
+  FS:     {{kind: coulomb, along: all}}
+  OFFSET: {{kind: offset,  along: all}}
+
+# Motors to joints, for measured records: qm = ratio (q - offset), tau = ratio' (torque_constant * u).
+# drives: {{ratio: [[100, 0], [0, 100]], offset: [0, 0], torque_constant: [1, 1]}}
+
+# For exciting trajectories: q as [lower, upper] or one number for +-; qd, qdd, tau as largest values.
+# limits: {{q: [pi, [-pi/2, pi/2]], qd: [3, 3], qdd: [10, 10], tau: [50, 20]}}
+
+# Standard parameters you know, for simulation; inertia about the origin of the link frame.
+# values: {{M1: 2.0, MX1: 0.5, ZZ1: 0.17}}
+"""
+
+
+def skeleton(name: str) -> str:
+    """Text of a commented two-joint robot file called `name`; raises DescriptionError if that is no identifier."""
+    check_identifier(name, ("name",))
+    return _SKELETON.format(name=name, schema=SCHEMA)
