@@ -1,0 +1,76 @@
+"""Drives: one matrix for both directions, power conserved, coupling left out on request."""
+
+import numpy as np
+import pytest
+
+from runtime.drives import Drives
+from runtime.errors import InputError
+
+RATIO = np.array([[32.0, 0, 0], [0, -48, 0], [0, 32, 45]])
+OFFSET = [0, -np.pi / 2, 0.3]
+CONSTANT = [0.1, 0.2, 0.05]
+
+
+@pytest.fixture
+def drives():
+    return Drives(RATIO, OFFSET, CONSTANT)
+
+
+@pytest.fixture
+def q():
+    return np.random.default_rng(1).normal(size=(20, 3))
+
+
+def test_there_and_back(drives, q):
+    np.testing.assert_allclose(drives.joint_position(drives.motor_position(q)), q, atol=1e-14)
+    np.testing.assert_allclose(drives.motor_command(drives.joint_torque(q)), q, atol=1e-14)
+
+
+def test_equations_written_out(drives, q):
+    np.testing.assert_allclose(drives.motor_position(q)[:, 2], 32 * (q[:, 1] + np.pi / 2) + 45 * (q[:, 2] - 0.3))
+    np.testing.assert_allclose(drives.joint_torque(q)[:, 1], -48 * 0.2 * q[:, 1] + 32 * 0.05 * q[:, 2])
+
+
+def test_power_is_that_of_the_motors(drives):
+    """taum' qdm = tau' qd, with qdm = R qd."""
+    rng = np.random.default_rng(2)
+    u, qd = rng.normal(size=(2, 20, 3))
+    at_rest = drives.motor_position(np.zeros((20, 3)))
+    qdm = drives.motor_position(qd) - at_rest
+    np.testing.assert_allclose((u * drives.torque_constant * qdm).sum(axis=1), (drives.joint_torque(u) * qd).sum(axis=1))
+
+
+@pytest.mark.parametrize(
+    ("coupling", "position", "torque"), [("both", True, True), ("position", True, False), ("torque", False, True), ("none", False, False)]
+)
+def test_coupling_left_out(drives, q, coupling, position, torque):
+    some, alone = drives.decoupled(coupling), Drives(np.diag(np.diag(RATIO)), OFFSET, CONSTANT)
+    np.testing.assert_allclose(some.joint_position(q), (drives if position else alone).joint_position(q))
+    np.testing.assert_allclose(some.joint_torque(q), (drives if torque else alone).joint_torque(q))
+
+
+def test_mapping_of_an_emitted_model():
+    drives = Drives.from_mapping({"ratio": RATIO.tolist(), "offset": OFFSET, "torque_constant": 2})
+    assert drives.torque_constant.tolist() == [2, 2, 2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (([[1.0, 2]], 0.0, 1.0), "expected (n, n)"),
+        ((np.diag([1.0, 0]), 0.0, 1.0), "singular"),
+        ((np.ones((2, 2)), 0.0, 1.0), "singular"),
+        ((np.eye(2), [0.0], 1.0), "offset has shape (1,)"),
+        ((np.eye(2), 0.0, 0.0), "torque constant zero"),
+        ((np.eye(2) * np.nan, 0.0, 1.0), "finite"),
+    ],
+)
+def test_bad_drives(arguments, said):
+    with pytest.raises(InputError) as e:
+        Drives(*arguments)
+    assert said in str(e.value)
+
+
+def test_wrong_number_of_joints(drives):
+    with pytest.raises(InputError, match=r"3 joints given an array of shape \(5, 2\)"):
+        drives.joint_position(np.zeros((5, 2)))

@@ -1,0 +1,167 @@
+"""Settings: defaults of the chapter, round trip, arithmetic, and errors that say which key."""
+
+import math
+
+import pytest
+
+from runtime.arithmetic import number
+from runtime.errors import InputError, SettingsError
+from runtime.io.datasets import DATASETS, dataset_study
+from runtime.io.study_files import load_study, study_from_text
+from runtime.study import Study, study_from_mapping, to_mapping
+
+DESIGN = """
+symgen: 1
+record:   {files: [q.csv.gz, tau.csv.gz], columns: {q: [Joint_1, Joint_2], tau: [Joint_1, Joint_2]}, side: motor, rate: 5000, units: {q: rad, tau: N*m}}
+signals:  {median: 5, lowpass: {cutoff: 50, order: 4, on: [q, qd]}, ends: one-sided, decimate: {factor: auto, phase: first}}
+rows:     {window: [0, 7.5], trim: 3, low_speed: 0}
+estimate: {method: ols, weights: none, columns: all}
+essential: {threshold: 1.04}
+validate: {split: [[0, 3.7], [3.7, 7.5]]}
+cestac:   {side: joint, rounding: two-point, delta: [2*pi/10000, 2*pi/5000, 2*pi/2000, 2*pi/1000], runs: 5, seed: 1, columns: essential, torque: null}
+controller: {kp: 160.18}
+"""
+
+
+def test_defaults_are_those_of_the_chapter():
+    study = Study()
+    assert (study.signals.lowpass.cutoff, study.signals.lowpass.order, study.signals.lowpass.on) == (50, 4, ("q", "qd"))
+    assert study.signals.decimate.factor == "auto"
+    assert study.essential.threshold == 1.04
+    assert study.cestac.runs == 5
+    assert study.cestac.delta == tuple(2 * math.pi / k for k in (10000, 5000, 2000, 1000))
+
+
+def test_study_file_of_the_design():
+    study = study_from_text(DESIGN)
+    defaults = Study()
+    assert (study.signals, study.estimate, study.essential, study.cestac) == (
+        defaults.signals,
+        defaults.estimate,
+        defaults.essential,
+        defaults.cestac,
+    )
+    assert study.record[0].files == ("q.csv.gz", "tau.csv.gz") and study.record[0].side == "motor"
+    assert study.rows.window == (0, 7.5)
+    assert study.controller == {"kp": 160.18}
+
+
+@pytest.mark.parametrize("study", [Study(), study_from_text(DESIGN), *(study_from_mapping(dataset_study(name)) for name in DATASETS)])
+def test_written_settings_read_back(study):
+    mapping = to_mapping(study)
+    assert study_from_mapping(mapping) == study
+    assert set(mapping) == {"symgen", "record", "signals", "rows", "estimate", "essential", "validate", "cestac", "controller"}
+    assert set(mapping["signals"]) == {"median", "lowpass", "ends", "decimate"}  # complete, defaults filled
+
+
+def test_a_filter_is_switched_off_by_null():
+    study = study_from_text("signals: {lowpass: null, decimate: null, median: 1}")
+    assert study.signals.lowpass is None and study.signals.decimate is None
+
+
+def test_one_record_or_several():
+    assert len(study_from_text("record: {files: a.csv}").record) == 1
+    assert [r.files for r in study_from_text("record: [{files: a.csv}, {files: b.csv}]").record] == [("a.csv",), ("b.csv",)]
+
+
+@pytest.mark.parametrize(
+    ("mapping", "path", "said"),
+    [
+        ({"signal": {}}, ("signal",), "unknown key signal; known: symgen, record, signals"),
+        ({"signals": {"lowpas": 1}}, ("signals", "lowpas"), "known: median, lowpass, ends, decimate"),
+        ({"signals": {"median": 4}}, ("signals", "median"), "odd window"),
+        ({"signals": {"median": 2.5}}, ("signals", "median"), "expected an integer"),
+        ({"signals": {"lowpass": {"cutoff": "fast"}}}, ("signals", "lowpass", "cutoff"), "expected a number"),
+        ({"signals": {"lowpass": {"cutoff": -1}}}, ("signals", "lowpass", "cutoff"), "positive"),
+        ({"signals": {"lowpass": {"on": ["qdd"]}}}, ("signals", "lowpass", "on", 0), "expected q or qd"),
+        ({"signals": {"decimate": {"factor": 0}}}, ("signals", "decimate", "factor"), "auto or an integer"),
+        ({"rows": {"window": [1, 0]}}, ("rows", "window"), "the earlier time first"),
+        ({"rows": {"window": [1]}}, ("rows", "window"), "expected 2"),
+        ({"rows": {"low_speed": "slow"}}, ("rows", "low_speed"), "expected a number"),
+        ({"estimate": {"method": "magic"}}, ("estimate", "method"), "expected ols or wls"),
+        ({"essential": {"threshold": 1}}, ("essential", "threshold"), "above 1"),
+        ({"record": [{"files": "a"}, {"side": "left"}]}, ("record", 1, "side"), "expected motor or joint"),
+        ({"record": {"rate": True}}, ("record", "rate"), "expected a number"),
+        ({"record": {"units": {"q": "counts"}}}, ("record", "counts_per_revolution"), "counts need it"),
+        ({"cestac": {"runs": 1}}, ("cestac", "runs"), "at least 2"),
+        ({"cestac": {"delta": [1e-3, float("inf")]}}, ("cestac", "delta", 1), "expected a number"),
+        ({"symgen": 2}, ("symgen",), "this version reads 1"),
+        ({"validate": {"split": [[0, 1]]}}, ("validate", "split"), "at least two"),
+    ],
+)
+def test_errors_give_the_path(mapping, path, said):
+    with pytest.raises(SettingsError) as e:
+        study_from_mapping(mapping)
+    assert e.value.path[: len(path)] == path or e.value.path == path[:-1]
+    assert said in str(e.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        ("symgen: 1\nsignals:\n  lowpass: {cutoff: 50,\n    order: four}\n", 4, "signals.lowpass.order"),
+        ("record:\n- files: a\n- files: b\n  side: 3\n", 4, "record[1].side"),
+        ("cestac:\n  delta:\n  - 1e-3\n  - 2*qi\n", 4, "cestac.delta[1]"),
+        ("rows: {window: [0,\n", 2, "not YAML"),
+        ("rows: {trim: 1}\nrows: {trim: 2}\n", 2, "duplicate key"),
+        ("rows: 3", 1, "expected a mapping"),
+    ],
+)
+def test_errors_of_a_file_give_the_line(text, line, said):
+    with pytest.raises(SettingsError) as e:
+        study_from_text(text, file="arm.study.yaml")
+    assert e.value.line == line and said in str(e.value) and "arm.study.yaml" in str(e.value)
+
+
+@pytest.mark.parametrize("text", ["a: !!python/object/apply:os.getcwd []", "a: &a [*a]", "- 1", "a: 2024-01-01", "\x00"])
+def test_other_content_is_refused(text):
+    with pytest.raises(InputError):
+        study_from_text(text)
+
+
+def test_an_alias_bomb_is_refused():
+    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"] + [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 9)]
+    with pytest.raises(InputError, match="100000 values"):
+        study_from_text("\n".join(lines))
+
+
+def test_load_study(tmp_path):
+    (tmp_path / "arm.yaml").write_text(DESIGN, encoding="utf-8")
+    assert load_study(tmp_path / "arm.yaml") == study_from_text(DESIGN)
+    with pytest.raises(InputError, match="cannot be read"):
+        load_study(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("2*pi/10000", 2 * math.pi / 10000), ("-3", -3), ("1e-3", 1e-3), ("(1 + 2)*3", 9), ("2**-3", 0.125), (" 4 ", 4), ("+pi", math.pi)],
+)
+def test_arithmetic(text, value):
+    assert number(text) == value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "x",
+        "pi()",
+        "2pi",
+        "1/0",
+        "10**400",
+        "9**9**9**9",
+        "(-1)**0.5",
+        "1j",
+        "True",
+        "[1]",
+        "__import__('os')",
+        "1 if 1 else 2",
+        "1,2",
+        "'a'",
+        "(" * 150,
+        "1" * 300,
+    ],
+)
+def test_arithmetic_refuses(text):
+    with pytest.raises(ValueError, match=r"number|value|allowed"):
+        number(text)
