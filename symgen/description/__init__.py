@@ -1,6 +1,7 @@
 """What a user writes: robot files, read into the frozen Robot."""
 
-from symgen.description.expression import Expression, parse
+from symgen.description.expression import Expression
+from symgen.description.grammar import parse
 from symgen.description.new import skeleton
 from symgen.description.robot import Drives, Element, Frame, Loop, Robot
 from symgen.description.schema import json_schema

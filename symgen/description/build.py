@@ -6,8 +6,10 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import TypeVar
 
-from symgen.description.expression import ONE, Expression, parse
-from symgen.description.robot import FIXED, Drives, Element, Form, Frame, Loop, Path, Robot, Row, form_of, row_of
+from symgen.description.expression import ONE, Expression
+from symgen.description.forms import form_of, row_of
+from symgen.description.grammar import parse
+from symgen.description.robot import FIXED, Drives, Element, Form, Frame, Loop, Path, Robot, Row
 from symgen.description.schema import DrivesTable, ElementTable, FrameRow, RobotFile
 from symgen.errors import DescriptionError, ExpressionError
 

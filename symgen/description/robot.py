@@ -18,11 +18,11 @@ import keyword
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import cached_property
 from types import MappingProxyType
 
 from symgen.description.expression import ONE, ZERO, Expression
+from symgen.description.forms import determinant, form_of, moves, row_of
 from symgen.errors import DescriptionError
 
 REVOLUTE, PRISMATIC, FIXED = 0, 1, 2
@@ -204,7 +204,6 @@ def parameter(family: str, j: int) -> str:
 # --- checks -----------------------------------------------------------------------------------------------------------
 
 ARGUMENTS = {"q", "qd", "qdd", "tau", "X", "D", "out", "frame", "standard", "np", "pi", "N", "B", "A"}
-STEM = re.compile(r"(?:[A-Z]+[a-z]*)\d[\d_]*R?\Z|(?:C|S)\d[\d_]*\Z|q\d+\Z|(?:QP|QDP|th)\d+\Z")
 
 
 def _check(robot: Robot) -> None:
@@ -306,9 +305,9 @@ def _check_geometry(robot: Robot) -> None:
             where = ("frames", f.j, name)
             e: Expression = getattr(f, name)
             variable = (name, f.sigma) in {("theta", REVOLUTE), ("r", PRISMATIC)}
-            if variable and (e.coefficient(f.q) != ONE or _moves(e - Expression.symbol(f.q))):
+            if variable and (e.coefficient(f.q) != ONE or moves(e - Expression.symbol(f.q))):
                 raise DescriptionError(f"frame {f.j}: {name} = {e}; expected {f.q} once, as {f.q} or {f.q} + constant", path=where)
-            if not variable and _moves(e):
+            if not variable and moves(e):
                 raise DescriptionError(
                     f"frame {f.j}: {name} = {e}; a joint position stands in theta if sigma is 0, in r if sigma is 1, nowhere else",
                     path=where,
@@ -384,7 +383,7 @@ def _check_tables(robot: Robot) -> None:
             raise DescriptionError(
                 f"drives: ratio has rows of {shape}; expected {n} rows of {n}, one per actuated joint", path=("drives", "ratio")
             )
-        if _determinant(robot.drives.ratio) == 0:
+        if determinant(robot.drives.ratio) == 0:
             raise DescriptionError(
                 "drives: ratio is singular; motor positions must determine the joint positions", path=("drives", "ratio")
             )
@@ -407,55 +406,6 @@ def _check_tables(robot: Robot) -> None:
     for name in robot.values:
         if name not in robot.parameters:
             raise DescriptionError(f"values: {name!r} is not a standard parameter of {robot.name}", path=("values", name))
-
-
-def _determinant(matrix: tuple[tuple[float, ...], ...]) -> Fraction:
-    a = [[Fraction(x) for x in row] for row in matrix]
-    det = Fraction(1)
-    for k in range(len(a)):
-        pivot = next((i for i in range(k, len(a)) if a[i][k]), None)
-        if pivot is None:
-            return Fraction(0)
-        if pivot != k:
-            a[k], a[pivot], det = a[pivot], a[k], -det
-        det *= a[k][k]
-        for i in range(k + 1, len(a)):
-            factor = a[i][k] / a[k][k]
-            a[i] = [x - factor * y for x, y in zip(a[i], a[k], strict=True)]
-    return det
-
-
-def row_of(e: Expression, robot_joints: tuple[int, ...]) -> dict[int, Expression]:
-    """The row G of s = G q; raises ValueError if the expression is not linear and homogeneous in the q's."""
-    row = {j: e.coefficient(f"q{j}") for j in robot_joints}
-    rest = e
-    for j, c in row.items():
-        rest = rest - c * Expression.symbol(f"q{j}")
-    if rest or any(_moves(c) for c in row.values()):
-        raise ValueError(f"{e} is not a combination of joint positions such as q5 + q6 or 2*q3")
-    return {j: c for j, c in row.items() if c}
-
-
-def form_of(e: Expression, robot_joints: tuple[int, ...]) -> dict[tuple[int, int], Expression]:
-    """The symmetric matrix B of the quadratic form q' B q; raises ValueError if the expression is not one."""
-    form: dict[tuple[int, int], Expression] = {}
-    rest = e
-    for i in robot_joints:
-        for j in robot_joints:
-            if i > j:
-                continue
-            c = e.coefficient(f"q{i}", f"q{j}")
-            rest = rest - c * Expression.symbol(f"q{i}") * Expression.symbol(f"q{j}")
-            if c:
-                half = c if i == j else c * Fraction(1, 2)
-                form[i, j] = form[j, i] = half
-    if rest or any(_moves(c) for c in form.values()):
-        raise ValueError(f"{e} is not a quadratic form in the joint positions such as q6**2 + 2*q5*q6")
-    return form
-
-
-def _moves(c: Expression) -> bool:
-    return any(re.fullmatch(r"q\d+", name) for name in c.symbols)
 
 
 __all__ = [

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
 
-from symgen.description.expression import parse
+from symgen.description.grammar import parse
 from symgen.description.robot import DIRECTIONS, KINDS, Path
 from symgen.errors import ExpressionError
 

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from symgen.description.expression import MAX_LENGTH, Expression, parse
+from symgen.description.expression import Expression
+from symgen.description.grammar import MAX_LENGTH, parse
 from symgen.errors import ExpressionError
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from symgen.description.expression import ONE, ZERO, parse
+from symgen.description.expression import ONE, ZERO
+from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, JOINT_FAMILIES, REVOLUTE, Element, Frame, Loop, Robot
 
 Row = tuple[int, int, str, str, str, str]  # ant, sigma, alpha, d, theta, r

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from symgen.description.expression import ONE, ZERO, Expression, parse, quarter_turns
+from symgen.description.expression import ONE, ZERO, Expression, quarter_turns
+from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Robot
 
 Array = np.ndarray[Any, Any]

@@ -1,0 +1,160 @@
+"""The grammar of robot files: text to Expression, never evaluated as Python.
+
+    sum     = product (("+" | "-") product)*
+    product = unary (("*" | "/") unary)*
+    unary   = ("+" | "-")* power
+    power   = primary ["**" ["-"] primary]          exponent: a whole number
+    primary = number | name | function "(" sum ")" | "(" sum ")"
+
+Names are `pi` and the declared symbols, functions sin, cos, tan, sqrt; anything else is an ExpressionError at its column. Length,
+depth, exponents, terms and digits are bounded, so that no text takes long to read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from fractions import Fraction
+
+from symgen.description.expression import Expression, call
+from symgen.errors import ExpressionError
+
+FUNCTIONS = ("sin", "cos", "tan", "sqrt")
+MAX_LENGTH, MAX_DEPTH, MAX_EXPONENT, MAX_TERMS, MAX_DIGITS = 2000, 40, 32, 400, 60
+
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<op>\*\*|[-+*/()]))", re.ASCII
+)
+
+
+class _Parser:
+    def __init__(self, text: str, symbols: Iterable[str] | None) -> None:
+        self.text = text
+        self.symbols = None if symbols is None else frozenset(symbols)
+        self.depth = 0
+        self.tokens: list[tuple[str, str, int]] = []
+        if len(text) > MAX_LENGTH:
+            raise self.error(f"expression of {len(text)} characters; at most {MAX_LENGTH} are read", 1)
+        position, end = 0, len(text.rstrip())
+        while position < end:
+            match = _TOKEN.match(text, position)
+            if match is None:
+                at = len(text) - len(text[position:].lstrip())
+                raise self.error(
+                    f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** ( ), sin, cos, tan, sqrt", at + 1
+                )
+            kind = str(match.lastgroup)
+            self.tokens.append((kind, match.group(kind), match.start(kind) + 1))
+            position = match.end()
+        self.tokens.append(("end", "end of text", len(text) + 1))
+        self.position = 0
+
+    def error(self, message: str, column: int) -> ExpressionError:
+        return ExpressionError(message, text=self.text, column=column)
+
+    def accept(self, *texts: str) -> str | None:
+        kind, text, _ = self.tokens[self.position]
+        if kind == "op" and text in texts:
+            self.position += 1
+            return text
+        return None
+
+    def guard(self, e: Expression) -> Expression:
+        if len(e.terms) > MAX_TERMS or any(abs(n) > MAX_EXPONENT for m in e.terms for _, n in m):
+            raise self.error(
+                f"expression expands to more than {MAX_TERMS} terms or powers above {MAX_EXPONENT}; introduce a constant",
+                self.tokens[self.position][2],
+            )
+        if any(len(str(c.numerator)) + len(str(c.denominator)) > 4 * MAX_DIGITS for c in e.terms.values()):
+            raise self.error("number with too many digits", self.tokens[self.position][2])
+        return e
+
+    def sum(self) -> Expression:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise self.error(f"nested more than {MAX_DEPTH} deep", self.tokens[self.position][2])
+        e = self.product()
+        while op := self.accept("+", "-"):
+            e = self.guard(e + self.product() if op == "+" else e - self.product())
+        self.depth -= 1
+        return e
+
+    def product(self) -> Expression:
+        e = self.unary()
+        while op := self.accept("*", "/"):
+            column = self.tokens[self.position][2]
+            f = self.unary()
+            if op == "/" and not f:
+                raise self.error("division by zero", column)
+            e = self.guard(e * f if op == "*" else e * f.inverse())
+        return e
+
+    def unary(self) -> Expression:
+        negative = False
+        while op := self.accept("+", "-"):
+            negative ^= op == "-"
+        e = self.power()
+        return -e if negative else e
+
+    def power(self) -> Expression:
+        base = self.primary()
+        if self.accept("**"):
+            column = self.tokens[self.position][2]
+            negative = self.accept("-") is not None
+            exponent = self.primary().constant
+            if exponent is None or exponent.denominator != 1 or abs(exponent) > MAX_EXPONENT:
+                raise self.error(f"exponent must be a whole number between -{MAX_EXPONENT} and {MAX_EXPONENT}", column)
+            n = -int(exponent) if negative else int(exponent)
+            if n < 0 and not base:
+                raise self.error("division by zero", column)
+            if len(base.terms) > 1 and abs(n) > 8:
+                raise self.error("power of a sum above 8; introduce a constant", column)
+            factor, result = base.inverse() if n < 0 else base, Expression.number(1)
+            for _ in range(abs(n)):  # guarded step by step: nested powers are refused before they grow
+                result = self.guard(result * factor)
+            return result
+        return base
+
+    def primary(self) -> Expression:
+        kind, text, column = self.tokens[self.position]
+        self.position += 1
+        if kind == "number":
+            mantissa, _, exponent = text.lower().partition("e")
+            if len(mantissa) > MAX_DIGITS or (exponent and abs(int(exponent[:9])) > MAX_DIGITS):
+                raise self.error("number with too many digits", column)
+            return Expression.number(Fraction(text))
+        if kind == "op" and text == "(":
+            e = self.sum()
+            if self.accept(")") is None:
+                raise self.error("missing )", self.tokens[self.position][2])
+            return e
+        if kind == "name":
+            if self.accept("("):
+                if text not in FUNCTIONS:
+                    raise self.error(f"{text!r} is not a function of the grammar; sin, cos, tan and sqrt are", column)
+                e = self.sum()
+                if self.accept(")") is None:
+                    raise self.error("missing )", self.tokens[self.position][2])
+                try:
+                    return call(text, e)
+                except (ValueError, ZeroDivisionError) as error:
+                    raise self.error(f"{text} of {e}: {error or 'division by zero'}", column) from error
+            if text == "pi" or self.symbols is None or text in self.symbols:
+                return Expression.symbol(text)
+            raise self.error(f"undeclared symbol {text!r}; declared here: {', '.join(sorted(self.symbols)) or 'none'}", column)
+        raise self.error(f"expected a number, a symbol or (, found {text!r}", column)
+
+
+def parse(text: str | int | float, symbols: Iterable[str] | None = None) -> Expression:
+    """Read one expression; `symbols` are the declared names (None: any).
+
+    Raises ExpressionError with the column of whatever is outside the grammar.
+    """
+    if isinstance(text, (int, float)) and not isinstance(text, bool):
+        text = repr(text)
+    parser = _Parser(str(text), symbols)
+    e = parser.sum()
+    kind, found, column = parser.tokens[parser.position]
+    if kind != "end":
+        raise parser.error(f"unexpected {found!r} after a complete expression", column)
+    return e
