@@ -66,6 +66,8 @@ def read_text(data: bytes, file: str) -> TextTable:
         names = tuple(str(i + 1) for i in range(len(header)))
     else:
         names, numbered = tuple(header), numbered[1:]
+    if not numbered:
+        raise InputError(f"no line of numbers under the header {', '.join(names)}", file=file)
     double = sorted({name for name in names if names.count(name) > 1})
     if double:
         raise InputError(f"header names {', '.join(double)} more than once", file=file)

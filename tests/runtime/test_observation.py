@@ -1,0 +1,228 @@
+"""The observed system: equal to the plain recipe, row bookkeeping, the steps that a resolution study repeats, several records as one."""
+
+import types
+
+import emps_model
+import numpy as np
+import planar_2r_model as planar
+import pytest
+import scipy.signal
+from planar_data import TRUE, motion
+
+from runtime import Record, observe, stack, study_from_mapping
+from runtime.columns import decimated_columns, distinct_entries, signals_of
+from runtime.errors import InputError
+from runtime.observation import decimated_torque, observation_from_states, select_rows
+from runtime.signals import States, decimated, filtered_states
+from runtime.study import Decimate
+
+RATE, N = 1000.0, 6000
+T = np.arange(N) / RATE
+
+
+def study(**sections):
+    return study_from_mapping({"signals": {"median": 1}, **sections})
+
+
+@pytest.fixture(scope="module")
+def record():
+    q, qd, qdd = motion(T)
+    return Record(T, q, planar.regressor(q, qd, qdd) @ TRUE, RATE, "arm", {"arm.csv": "ab" * 32})
+
+
+def test_noise_free_data_return_the_parameters(record):
+    """1e-3: the low-pass at 50 Hz rounds sign(qd) and the derivatives are differences; both are errors of the method, not of the code."""
+    o = observe(planar, record, study())
+    X = np.linalg.lstsq(o.W, o.Y, rcond=None)[0]
+    np.testing.assert_allclose(X, TRUE, rtol=1e-3, atol=1e-3)
+
+
+def test_plain_recipe(record):
+    """W and Y by the chapter's words, column by column with scipy.signal.decimate."""
+    s = study(rows={"trim": 0})
+    o = observe(planar, record, s)
+    states = filtered_states(record.q, RATE, s.signals)
+    W = planar.observation_matrix(states.q, states.qd, states.qdd).reshape(2, N, -1)
+    W = scipy.signal.decimate(W, 8, zero_phase=True, axis=1)  # eq. (13): 0.8*1000/(2*50)
+    assert o.W.shape == (2 * 750, 10) and o.rate == 125
+    np.testing.assert_allclose(o.W, W.reshape(1500, -1), atol=1e-9)
+    np.testing.assert_allclose(o.Y.reshape(2, -1), scipy.signal.decimate(record.tau.T, 8, zero_phase=True), atol=1e-9)
+    np.testing.assert_allclose(o.t[:750], T[::8])
+    assert o.W.flags.f_contiguous
+
+
+def test_zero_entries_stay_zero(record):
+    o = observe(planar, record, study())
+    for j in range(2):
+        assert not o.W[o.joint(j)][:, ~planar.STRUCTURE[:, j]].any()
+
+
+def test_equal_signals_are_filtered_once():
+    entries = distinct_entries(planar, {})
+    assert len(entries.k) == planar.STRUCTURE.sum() == 13
+    assert len(entries.source) == 12  # ZZ2 acts alike on both joints
+    states = States(*(x[:100] for x in motion(T)))
+    signals = signals_of(planar, states, entries, {})
+    D = planar.regressor(states.q, states.qd, states.qdd)
+    for k, j, which, sign in zip(entries.k, entries.j, entries.which, entries.sign, strict=True):
+        np.testing.assert_array_equal(sign * signals[which], D[:, j, k])
+
+
+def test_opposite_and_constant_signals():
+    def regressor(q, qd, qdd, *, out=None):
+        S = np.zeros((4, 2, len(q))) if out is None else out
+        S[0, 0], S[0, 1], S[1, 0], S[2, 1], S[3, 0] = qd[:, 0], -qd[:, 0], 1, 1, np.sign(qd[:, 0])
+        return S.transpose(2, 1, 0)
+
+    structure = np.array([[1, 1], [1, 0], [0, 1], [1, 0]], dtype=bool)
+    model = types.SimpleNamespace(JOINTS=(1, 2), STRUCTURE=structure, store=lambda N: np.zeros((4, 2, N)), regressor=regressor)
+    entries = distinct_entries(model, {})
+    assert len(entries.source) == 3  # qd1, 1 and sign(qd1)
+    qd = np.random.default_rng(0).normal(size=(300, 2))
+    columns = decimated_columns(model, States(qd, qd, qd), 2, Decimate(), {})
+    np.testing.assert_array_equal(columns[0, 1], -columns[0, 0])
+    np.testing.assert_array_equal(columns[1, 0], columns[2, 1])
+    np.testing.assert_allclose(columns[3, 0], decimated(np.sign(qd[:, 0]), 2, Decimate()))
+
+
+def test_states_out_of_reach_are_not_merged():
+    """A loop that does not close at the random states gives nan there: every entry then stands for itself."""
+
+    def regressor(q, qd, qdd, *, out=None):
+        S = np.zeros((2, 1, len(q))) if out is None else out
+        S[0, 0], S[1, 0] = np.arccos(q[:, 0]), np.arcsin(q[:, 0])
+        return S.transpose(2, 1, 0)
+
+    model = types.SimpleNamespace(
+        JOINTS=(1,), STRUCTURE=np.ones((2, 1), dtype=bool), store=lambda N: np.zeros((2, 1, N)), regressor=regressor
+    )
+    assert len(distinct_entries(model, {}).source) == 2
+
+
+def test_blocks_equal_the_whole(record):
+    entries = distinct_entries(planar, {})
+    states = States(*motion(np.arange(10000) / RATE))  # longer than two blocks
+    D = planar.regressor(states.q, states.qd, states.qdd).transpose(2, 1, 0)
+    np.testing.assert_array_equal(signals_of(planar, states, entries, {}), D[entries.k[entries.source], entries.j[entries.source]])
+
+
+def test_rows_left_out_are_counted(record):
+    s = study(rows={"window": [1.0, 5.0], "trim": 4, "low_speed": [0.5, 0.0]})
+    o = observe(planar, record, s)
+    states = filtered_states(record.q, RATE, s.signals)
+    K = len(range(1000, 5001, 8))
+    slow = np.abs(states.qd[1000:5001:8, 0][4:-4]) < 0.5
+    assert o.dropped == {"trim": (8, 8), "low_speed": (int(slow.sum()), 0), "mask": (0, 0)}
+    assert o.rows == (K - 8 - int(slow.sum()), K - 8)
+    assert o.t.min() == pytest.approx(1.032) and o.t.max() <= 5
+    np.testing.assert_allclose(o.t[o.joint(0)], T[1000:5001:8][4:-4][~slow])
+    assert o.joints.tolist() == [0] * o.rows[0] + [1] * o.rows[1]
+
+
+def test_mask_of_samples_and_joints(record):
+    keep = np.ones((N, 2), dtype=bool)
+    keep[:3000, 1] = False
+    o = observe(planar, record, study(rows={"trim": 0}), keep=keep)
+    assert o.dropped["mask"] == (0, 375) and o.t[o.joint(1)].min() == pytest.approx(3.0)
+    assert observe(planar, record, study(rows={"trim": 0}), keep=keep[:, 1]).rows == (375, 375)
+    with pytest.raises(InputError, match="expected bool"):
+        observe(planar, record, study(), keep=np.ones(5, dtype=bool))
+
+
+def test_settings_are_written_in_full(record):
+    o = observe(planar, record, study())
+    assert o.settings["factor"] == 8
+    assert o.settings["signals"]["lowpass"] == {"cutoff": 50.0, "order": 4, "on": ["q", "qd"], "padding": "matlab"}
+    assert o.settings["rows"] == {"window": [None, None], "trim": 3, "low_speed": 0.0}
+    assert o.files == {"arm.csv": "ab" * 32}
+
+
+def test_steps_of_a_resolution_study(record):
+    """Perturbed positions give another W; Y and the rows stay those of the record."""
+    s = study(rows={"low_speed": 0.3})
+    states = filtered_states(record.q, RATE, s.signals)
+    selection = select_rows(record, states.qd, s.signals, s.rows)
+    torque = decimated_torque(record.tau, selection)
+    whole = observe(planar, record, s)
+    same = observation_from_states(planar, states, torque, selection, files=record.files)
+    np.testing.assert_array_equal(same.W, whole.W)
+    np.testing.assert_array_equal(same.Y, whole.Y)
+    noise = 1e-3 * np.random.default_rng(1).choice([-1, 1], size=record.q.shape)
+    noisy = observation_from_states(planar, filtered_states(record.q + noise, RATE, s.signals), torque, selection)
+    np.testing.assert_array_equal(noisy.Y, whole.Y)
+    assert noisy.rows == whole.rows and not np.allclose(noisy.W, whole.W, atol=1e-6)
+
+
+def test_constants_in_place_of_the_robot_file(record):
+    a, b = observe(planar, record, study()), observe(planar, record, study(), constants={"g": 0.0})
+    assert np.linalg.norm(a.W[:, 1]) > 0 and not b.W[:, 1].any()
+
+
+def test_no_filters_at_all(record):
+    o = observe(planar, record, study(signals={"median": 1, "lowpass": None, "decimate": None}, rows={"trim": 0}))
+    np.testing.assert_array_equal(o.Y, record.tau.T.ravel())
+    assert o.W.shape == (2 * N, 10)
+
+
+# --- selecting and stacking -------------------------------------------------------------------------------------------
+
+
+def test_columns_and_windows(record):
+    o = observe(planar, record, study())
+    some = o.columns(["FV2", "ZZ1R"])
+    np.testing.assert_array_equal(some.W, o.W[:, [8, 0]])
+    first, second = o.between(None, 3.0), o.between(np.nextafter(3.0, 4), None)
+    assert tuple(np.add(first.rows, second.rows)) == o.rows
+    np.testing.assert_array_equal(np.concatenate([first.Y[first.joint(1)], second.Y[second.joint(1)]]), o.Y[o.joint(1)])
+    with pytest.raises(InputError, match="no column FV9; there are ZZ1R"):
+        o.columns(["FV9"])
+    with pytest.raises(InputError, match=r"no row in \[100, 200\] s"):
+        o.between(100, 200)
+
+
+def test_stack_is_joint_major(record):
+    a = observe(planar, record, study(rows={"window": [0, 2.0]}))
+    b = observe(planar, record, study(rows={"window": [3.0, 6.0]}))
+    o = stack([a, b, b])
+    assert o.rows == tuple(np.add(a.rows, np.add(b.rows, b.rows)))
+    np.testing.assert_array_equal(o.W[o.joint(1)], np.vstack([a.W[a.joint(1)], b.W[b.joint(1)], b.W[b.joint(1)]]))
+    np.testing.assert_array_equal(o.W[o.record == 1], b.W)
+    assert sorted(set(o.record)) == [0, 1, 2]
+    assert o.dropped["trim"] == (18, 18)
+    assert [s["rows"]["window"] for s in o.settings["records"]] == [[0.0, 2.0], [3.0, 6.0], [3.0, 6.0]]
+    assert stack([a]).W.shape == a.W.shape and "records" not in stack([b, b]).settings
+    nested = stack([stack([a, b]), b])
+    np.testing.assert_array_equal(nested.record[nested.joint(0)], o.record[o.joint(0)])
+
+
+def test_stack_refuses(record):
+    a = observe(planar, record, study())
+    with pytest.raises(InputError, match="no observation"):
+        stack([])
+    with pytest.raises(InputError, match="expected those of the first record"):
+        stack([a, a.columns(["FV1"])])
+
+
+# --- refusals ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("sections", "said"),
+    [
+        ({"rows": {"window": [10, 20]}}, "no sample in rows.window [10.0, 20.0] s; the record spans [0, 5.999] s"),
+        ({"rows": {"window": [0, 0.02], "trim": 0}}, "needs more than 27"),
+        ({"rows": {"trim": 400}}, "rows.trim leaves out 800"),
+        ({"rows": {"low_speed": 100}}, "no row is left"),
+        ({"rows": {"low_speed": [1, 2, 3]}}, "rows.low_speed has 3 values; expected one or 2"),
+        ({"signals": {"lowpass": {"cutoff": 500}}}, "Nyquist"),
+    ],
+)
+def test_refusals(record, sections, said):
+    with pytest.raises(InputError) as e:
+        observe(planar, record, study(**sections))
+    assert said in str(e.value)
+
+
+def test_model_of_another_robot(record):
+    with pytest.raises(InputError, match=r"emps: q has shape \(6000, 2\)"):
+        observe(emps_model, record, study())

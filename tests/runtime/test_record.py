@@ -1,0 +1,296 @@
+"""Records and the reading of them: units and sides explicit, every bad input named with file, column and line."""
+
+import gzip
+import hashlib
+
+import numpy as np
+import pytest
+import scipy.io
+
+from runtime import Drives, Record, read_record, read_records
+from runtime.errors import InputError
+from runtime.study import RecordSettings, study_from_mapping
+
+N, RATE = 60, 200.0
+T = np.arange(N) / RATE
+Q = np.stack([np.sin(T), np.cos(3 * T)], axis=1)
+TAU = np.stack([T, T**2], axis=1)
+
+
+def settings(**record):
+    return study_from_mapping({"record": record}).record[0]
+
+
+def write_csv(path, header="t,q1,q2,tau1,tau2", rows=None, delimiter=","):
+    rows = np.column_stack([T, Q, TAU]) if rows is None else rows
+    lines = [delimiter.join(format(x, ".17g") if not isinstance(x, str) else x for x in row) for row in rows]
+    text = "\n".join(([header] if header else []) + lines) + "\n"
+    path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
+    return path
+
+
+def with_at(x, value):
+    """A copy of x with `value` in the first column of sample 8."""
+    x = x.copy()
+    x[7, 0] = value
+    return x
+
+
+def cells():
+    return [list(row) for row in np.column_stack([T, Q, TAU])]
+
+
+# --- the record itself ------------------------------------------------------------------------------------------------
+
+
+def test_record_is_a_read_only_copy():
+    q = Q.copy()
+    record = Record(T, q, TAU, RATE)
+    q[0, 0] = 9
+    assert record.q[0, 0] == 0 and record.n == 2 and len(record) == N
+    with pytest.raises(ValueError, match="read-only"):
+        record.q[0, 0] = 1
+    assert Record(T, Q[:, 0], TAU[:, 0], RATE).q.shape == (N, 1)
+
+
+@pytest.mark.parametrize(
+    ("t", "q", "tau", "rate", "said"),
+    [
+        (T, Q[:-1], TAU, RATE, "expected (N,), (N, n), (N, n)"),
+        (T, Q[:, :1], TAU, RATE, "expected (N,), (N, n), (N, n)"),
+        (T[:5], Q[:5], TAU[:5], RATE, "at least 10"),
+        (T, Q, TAU, 0.0, "positive"),
+        (T, with_at(Q, np.nan), TAU, RATE, "column 'q1', sample 8"),
+        (T, Q, with_at(TAU, np.inf), RATE, "column 'tau1', sample 8"),
+    ],
+)
+def test_record_refuses(t, q, tau, rate, said):
+    with pytest.raises(InputError) as e:
+        Record(t, q, tau, rate)
+    assert said in str(e.value)
+
+
+# --- kinds of files ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.csv.gz", "a.txt"])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
+def test_plain_file_needs_no_column_names(tmp_path, name, delimiter):
+    path = write_csv(tmp_path / name, header=delimiter.join(["t", "q1", "q2", "tau1", "tau2"]), delimiter=delimiter)
+    record = read_record(settings(files=path.name), folder=tmp_path)
+    np.testing.assert_array_equal(record.q, Q)
+    np.testing.assert_array_equal(record.tau, TAU)
+    assert record.rate == pytest.approx(RATE) and record.name == "a"
+
+
+def test_hash_is_that_of_the_uncompressed_bytes(tmp_path):
+    plain = write_csv(tmp_path / "a.csv")
+    packed = write_csv(tmp_path / "b.csv.gz")
+    digest = hashlib.sha256(plain.read_bytes()).hexdigest()
+    assert read_record(settings(files=str(plain))).files == {"a.csv": digest}
+    assert read_record(settings(files=str(packed))).files == {"b.csv.gz": digest}
+
+
+def test_file_without_header_counts_its_columns(tmp_path):
+    write_csv(tmp_path / "a.csv", header="")
+    record = read_record(settings(files="a.csv", columns={"t": 1, "q": [2, 3], "tau": [4, 5]}), folder=tmp_path)
+    np.testing.assert_array_equal(record.q, Q)
+
+
+def test_two_files_with_equal_column_names(tmp_path):
+    write_csv(tmp_path / "q.csv", header="Joint_1,Joint_2", rows=Q)
+    write_csv(tmp_path / "tau.csv", header="# torques\nJoint_1,Joint_2", rows=TAU)
+    columns = {"q": ["Joint_1", "Joint_2"], "tau": ["Joint_1", "Joint_2"]}
+    record = read_record(settings(files=["q.csv", "tau.csv"], columns=columns, rate=RATE), folder=tmp_path)
+    np.testing.assert_array_equal(record.q, Q)
+    np.testing.assert_array_equal(record.tau, TAU)
+    np.testing.assert_allclose(record.t, T)
+    assert set(record.files) == {"q.csv", "tau.csv"}
+
+
+def test_arrays_of_npz_and_mat(tmp_path):
+    np.savez(tmp_path / "a.npz", t=T, q=Q, tau=TAU, note=np.array("text"))
+    scipy.io.savemat(tmp_path / "a.mat", {"t": T[None, :], "pos": Q, "u1": TAU[:, :1], "u2": TAU[:, 1:], "gain": 2.0, "s": {"x": 1}})
+    a = read_record(settings(files="a.npz", columns={"t": "t", "q": "q", "tau": "tau"}), folder=tmp_path)
+    b = read_record(settings(files="a.mat", columns={"t": "t", "q": "pos", "tau": ["u1", "u2"]}, scale={"tau": "gain"}), folder=tmp_path)
+    np.testing.assert_array_equal(a.q, b.q)
+    np.testing.assert_array_equal(2 * a.tau, b.tau)
+
+
+def test_pickled_objects_are_refused(tmp_path):
+    np.savez(tmp_path / "a.npz", q=np.array([object()], dtype=object))
+    with pytest.raises(InputError, match="not an archive of plain arrays"):
+        read_record(settings(files="a.npz"), folder=tmp_path)
+
+
+# --- units and sides --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("units", "extra", "factor"),
+    [
+        ({"q": "deg"}, {}, np.pi / 180),
+        ({"q": "rev"}, {}, 2 * np.pi),
+        ({"q": "mm"}, {}, 1e-3),
+        ({"q": "counts"}, {"counts_per_revolution": 4000}, 2 * np.pi / 4000),
+        ({"q": ["rad", "mm"]}, {}, [1, 1e-3]),
+        ({"q": ["counts", "m"]}, {"counts_per_revolution": [4000, 1]}, [2 * np.pi / 4000, 1]),
+    ],
+)
+def test_position_units(tmp_path, units, extra, factor):
+    write_csv(tmp_path / "a.csv")
+    np.testing.assert_allclose(read_record(settings(files="a.csv", units=units, **extra), folder=tmp_path).q, Q * factor)
+
+
+def test_time_in_milliseconds(tmp_path):
+    write_csv(tmp_path / "a.csv", rows=np.column_stack([1000 * T, Q, TAU]))
+    assert read_record(settings(files="a.csv", units={"t": "ms"}), folder=tmp_path).rate == pytest.approx(RATE)
+
+
+def test_torque_constants(tmp_path):
+    """A and V are turned into torque by the constant of the settings, then of the drives; N*m by none."""
+    write_csv(tmp_path / "a.csv")
+    drives = Drives(np.array([[10.0, 0], [5, 20]]), 0.0, [0.1, 0.2])
+
+    def tau(**record):
+        return read_record(settings(files="a.csv", **record), drives, folder=tmp_path).tau
+
+    np.testing.assert_allclose(tau(side="motor"), TAU @ drives.ratio)
+    np.testing.assert_allclose(tau(side="motor", units={"tau": "A"}), (TAU * [0.1, 0.2]) @ drives.ratio)
+    np.testing.assert_allclose(tau(side="motor", units={"tau": ["A", "N*m"]}), (TAU * [0.1, 1]) @ drives.ratio)
+    np.testing.assert_allclose(tau(side="motor", units={"tau": "A"}, torque_constant=3), (3 * TAU) @ drives.ratio)
+    np.testing.assert_allclose(tau(side="joint", units={"tau": "V"}, torque_constant=[3, 4]), TAU * [3, 4])
+    with pytest.raises(InputError, match=r"set record\.torque_constant"):
+        tau(side="joint", units={"tau": "A"})
+
+
+def test_motor_side_needs_drives(tmp_path):
+    write_csv(tmp_path / "a.csv")
+    drives = Drives(np.diag([2.0, -4.0]), [0.1, 0.2], 1.0)
+    np.testing.assert_allclose(read_record(settings(files="a.csv", side="motor"), drives, folder=tmp_path).q, Q / [2, -4] + [0.1, 0.2])
+    np.testing.assert_array_equal(read_record(settings(files="a.csv", side="joint"), drives, folder=tmp_path).q, Q)
+    with pytest.raises(InputError, match="has no drives"):
+        read_record(settings(files="a.csv", side="motor"), folder=tmp_path)
+
+
+def test_records_of_a_model(tmp_path):
+    import emps_model
+    import planar_2r_model
+
+    write_csv(tmp_path / "a.csv")
+    write_csv(tmp_path / "b.csv")
+    both = study_from_mapping({"record": [{"files": "a.csv"}, {"files": "b.csv", "name": "second"}]}).record
+    assert [r.name for r in read_records(both, planar_2r_model, folder=tmp_path)] == ["a", "second"]
+    with pytest.raises(InputError, match="2 joints; emps has 1"):
+        read_records(both, emps_model, folder=tmp_path)
+
+
+# --- bad files --------------------------------------------------------------------------------------------------------
+
+
+def spoiled(i, j, value):
+    rows = cells()
+    rows[i][j] = value
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (spoiled(3, 2, "nan"), "a.csv, column 'q2', line 5: nan (1 such values in all)"),
+        (spoiled(3, 2, ""), "a.csv, column 'q2', line 5: an empty field"),
+        (spoiled(3, 4, "1.5x"), "a.csv, column 'tau2', line 5: '1.5x'; expected a number"),
+        (spoiled(3, 0, T[2]), "a.csv, column 't', line 5: time goes from 0.01 s to 0.01 s; expected increasing time"),
+        (spoiled(3, 0, T[3] + 0.3 / RATE), "not uniform"),
+        ([*cells()[:20], *cells()[25:]], "a.csv, column 't', line 22: time is not uniform"),
+        (cells()[:4], "at least 10"),
+        ([*cells()[:4], [1.0, 2.0, 3.0]], "a.csv, line 6: 3 fields; expected 5 (t, q1, q2, tau1, tau2)"),
+        ([], "a.csv: no line of numbers"),
+    ],
+)
+def test_bad_csv(tmp_path, rows, said):
+    write_csv(tmp_path / "a.csv", rows=rows)
+    with pytest.raises(InputError) as e:
+        read_record(settings(files="a.csv"), folder=tmp_path)
+    assert said in str(e.value)
+
+
+@pytest.mark.parametrize(
+    ("record", "said"),
+    [
+        ({"columns": {"q": ["q1", "q3"]}}, "no column q3; the file has t, q1, q2, tau1, tau2"),
+        ({"columns": {"q": ["q1"]}}, "positions (60, 1) in a.csv, torques (60, 2)"),
+        ({"columns": {"t": "time"}}, "no column time"),
+        ({"rate": 100, "columns": {"t": "t"}}, "time runs at 200 Hz, record.rate is 100 Hz"),
+        ({"scale": {"tau": "gtau"}}, "no single number 'gtau' in a text file"),
+        ({"scale": {"q": [1, 2, 3]}}, "record.scale.q has 3 values; expected one or 2"),
+        ({"units": {"q": ["rad", "rad", "m"]}}, "record.units.q has 3 units"),
+        ({"files": ["b.csv"]}, "cannot be read"),
+        ({"files": ["b.xls"]}, "unknown kind of file '.xls'"),
+        ({"files": []}, "names no file"),
+    ],
+)
+def test_bad_settings(tmp_path, record, said):
+    write_csv(tmp_path / "a.csv")
+    with pytest.raises(InputError) as e:
+        read_record(settings(**{"files": "a.csv", **record}), folder=tmp_path)
+    assert said in str(e.value)
+
+
+def test_no_time_and_no_rate(tmp_path):
+    write_csv(tmp_path / "a.csv", header="q1,q2,tau1,tau2", rows=np.hstack([Q, TAU]))
+    with pytest.raises(InputError, match=r"set record\.rate"):
+        read_record(settings(files="a.csv"), folder=tmp_path)
+
+
+def test_wrong_number_of_joints(tmp_path):
+    write_csv(tmp_path / "a.csv")
+    with pytest.raises(InputError, match="the robot has 3 joints"):
+        read_record(settings(files="a.csv"), Drives(np.eye(3), 0.0, 1.0), folder=tmp_path)
+
+
+def test_different_lengths(tmp_path):
+    write_csv(tmp_path / "q.csv", header="q1,q2", rows=Q)
+    write_csv(tmp_path / "tau.csv", header="tau1,tau2", rows=TAU[:-1])
+    with pytest.raises(InputError, match=r"positions \(60, 2\) in q.csv, torques \(59, 2\) in tau.csv"):
+        read_record(settings(files=["q.csv", "tau.csv"], rate=RATE), folder=tmp_path)
+    np.savez(tmp_path / "a.npz", q1=Q[:, 0], q2=Q[1:, 1], tau1=T, tau2=T)
+    with pytest.raises(InputError, match="different lengths: q1 60, q2 59"):
+        read_record(settings(files="a.npz", rate=RATE), folder=tmp_path)
+
+
+def test_samples_along_the_first_axis(tmp_path):
+    np.savez(tmp_path / "a.npz", q=Q.T, tau=TAU.T)
+    with pytest.raises(InputError, match="samples along the first axis"):
+        read_record(settings(files="a.npz", rate=RATE, columns={"q": "q", "tau": "tau"}), folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("a.csv.gz", b"\x1f\x8bbroken", "damaged gzip"),
+        ("a.csv", b"\xff\xfe\x00", "UTF-8"),
+        ("a.csv", b"", "no line of numbers"),
+        ("a.csv", b"q1,q1,tau1\n1,2,3\n", "q1 more than once"),
+        ("a.csv", b"q1;tau1\n1,5;2\n", "decimals with a point"),
+        ("a.npz", b"PK nothing", "not an archive"),
+        ("a.mat", b"MATLAB 5.0 MAT-file" + bytes(200), "not a MATLAB file"),
+        ("a.mat", b"", "not a MATLAB file"),
+    ],
+)
+def test_damaged_files(tmp_path, name, data, said):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError) as e:
+        read_record(settings(files=name, rate=1.0), folder=tmp_path)
+    assert said in str(e.value) and name in str(e.value)
+
+
+def test_matlab_73_says_what_to_do(tmp_path):
+    (tmp_path / "a.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(512))
+    with pytest.raises(InputError, match="save -v7"):
+        read_record(settings(files="a.mat"), folder=tmp_path)
+
+
+def test_settings_have_at_most_two_files():
+    with pytest.raises(InputError, match="3 files"):
+        RecordSettings(files=("a", "b", "c"))
