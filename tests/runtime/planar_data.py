@@ -4,6 +4,7 @@ import numpy as np
 import planar_2r_model as planar
 
 from runtime.observation import Observation
+from runtime.record import Record
 from runtime.study import EstimateSettings
 
 OLS = EstimateSettings()
@@ -50,3 +51,11 @@ def observation(N=300, rate=30.0, noise=(0.0, 0.0), seed=0, X=TRUE, motion=motio
         settings={"signals": {"median": 1}},
         files={"q.csv": "ab" * 32},
     )
+
+
+def record(N=6000, rate=1000.0, noise=0.05, seed=0, X=TRUE):
+    """Record of the motion with exact positions and white torque noise of deviation `noise` N m."""
+    t = np.arange(N) / rate
+    q, qd, qdd = motion(t)
+    tau = planar.inverse_dynamics(q, qd, qdd, X) + noise * np.random.default_rng(seed).standard_normal((N, 2))
+    return Record(t, q, tau, rate, name="planar", files={"planar.csv": "cd" * 32})

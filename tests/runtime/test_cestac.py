@@ -1,0 +1,212 @@
+"""Resolution study on a simulated record of the planar arm."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import planar_2r_model as planar
+import pytest
+from planar_data import TRUE, record
+from scipy.stats import t
+
+from runtime.cestac import cestac, levels_of, perturbed_position, perturbed_torque
+from runtime.cestac_result import Level, Run, deciding_names, level_result, runs_from_json, runs_needed
+from runtime.drives import Drives
+from runtime.errors import InputError, SettingsError
+from runtime.estimators import estimate
+from runtime.observation import Observation, decimated_torque, observation_from_states, select_rows
+from runtime.signals import filtered_states
+from runtime.study import CestacSettings, Lowpass, Signals, Study
+
+SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20))
+RECORD = record()
+
+
+def study(**settings):
+    return Study(signals=SIGNALS, cestac=CestacSettings(**{"delta": (1e-3, 2e-3), "runs": 3, "columns": "all", **settings}))
+
+
+@pytest.fixture(scope="module")
+def small():
+    return cestac(planar, RECORD, study())
+
+
+def test_one_run_is_equations_15_to_17(small):
+    """The same run written out: perturb, filter, regressor on all columns, decimate, lstsq."""
+    bits = np.random.Generator(np.random.Philox(np.random.SeedSequence(1, spawn_key=(1, 2))))
+    noise = 2.0 * np.unpackbits(np.frombuffer(bits.bytes(1500), dtype=np.uint8)).reshape(6000, 2) - 1
+    states = filtered_states(RECORD.q + 2e-3 * noise, 1000.0, SIGNALS)
+    clean = filtered_states(RECORD.q, 1000.0, SIGNALS)
+    selection = select_rows(RECORD, clean.qd, SIGNALS, Study().rows)
+    seen = observation_from_states(planar, states, decimated_torque(RECORD.tau, selection), selection)
+    X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
+    run = small.levels[1].runs[2]
+    assert (run.level, run.run) == (1, 2)
+    assert np.allclose(run.X, X, rtol=1e-9)
+    assert np.isclose(run.residual_norm, np.linalg.norm(seen.Y - seen.W @ X), rtol=1e-9)
+
+
+def test_statistics_are_equations_18_to_22(small):
+    result, X_ls = small.levels[0], small.reference.X
+    X = np.array([run.X for run in result.runs])
+    mean = sum(X) / 3
+    sigma = np.sqrt(sum((X - mean) ** 2) / 2)
+    clean = filtered_states(RECORD.q, 1000.0, SIGNALS)
+    selection = select_rows(RECORD, clean.qd, SIGNALS, Study().rows)
+    seen = observation_from_states(planar, clean, decimated_torque(RECORD.tau, selection), selection)
+    rho_ls, rho = (np.linalg.norm(seen.Y - seen.W @ x) for x in (X_ls, mean))
+    own = np.mean([run.residual_norm for run in result.runs])
+    assert np.allclose(X_ls, estimate(seen).X, rtol=1e-9)
+    assert np.allclose(result.mean, mean) and np.allclose(result.sigma, sigma)
+    assert np.allclose(result.relative_sigma, 100 * sigma / np.abs(mean))
+    assert np.allclose(result.e, 100 * np.abs(1 - mean / X_ls))
+    assert np.isclose(result.e_rho, 100 * abs(1 - rho / rho_ls))
+    assert np.isclose(result.e_rho_own, 100 * abs(1 - own / rho_ls))
+    assert np.isclose(result.increase, 100 * (rho - rho_ls) / np.linalg.norm(seen.Y))
+    assert np.isclose(result.increase_own, 100 * (own - rho_ls) / np.linalg.norm(seen.Y))
+    assert np.allclose(result.half_width, 4.302652729911275 * sigma / np.sqrt(3))  # Student, 2 degrees of freedom, 97.5 %
+
+
+def test_processes_give_the_same_bits(small):
+    calls = []
+    for workers in (1, 2):
+        again = cestac(planar, RECORD, study(), workers=workers, progress=lambda run, done, total: calls.append((done, total)))
+        assert again.to_json() == small.to_json()
+    assert calls == [(done, 6) for done in range(1, 7)] * 2
+
+
+def test_finished_runs_are_not_repeated(small):
+    done = runs_from_json(small.to_json())
+    new = []
+    longer = cestac(planar, RECORD, study(runs=4), finished=done, progress=lambda run, *_: new.append((run.level, run.run)))
+    assert new == [(0, 3), (1, 3)]
+    assert longer.levels[0].runs[:3] == small.levels[0].runs
+    with pytest.raises(InputError, match="another study"):
+        cestac(planar, RECORD, study(columns=("ZZ1R",)), finished=done)
+
+
+def test_bias_grows_as_the_square_of_the_step():
+    """e(2 Delta) / e(Delta) = 4 while the bias is small; common random numbers, so that only Delta differs."""
+    found = cestac(planar, record(noise=0.0), study(delta=(5e-4, 1e-3, 2e-3), runs=20, common=True))
+    for name in ("ZZ1R", "ZZ2"):
+        i = found.names.index(name)
+        bias = np.array([found.reference.X[i] - level.mean[i] for level in found.levels])
+        assert np.all(bias > 0)  # errors in variables: inertias shrink
+        assert np.allclose(bias[1:] / bias[:-1], 4, rtol=0.25)
+
+
+def test_gaussian_biases_as_two_point_and_uniform_a_third():
+    shrunk = {}
+    for mode in ("two-point", "gaussian", "uniform", "quantise"):
+        found = cestac(planar, record(noise=0.0), study(delta=(1e-3,), runs=12, rounding=mode))
+        shrunk[mode] = found.levels[0].e[0]
+    assert np.isclose(shrunk["gaussian"] / shrunk["two-point"], 1, rtol=0.2)
+    for mode in ("uniform", "quantise"):
+        assert np.isclose(shrunk[mode] / shrunk["two-point"], 1 / 3, rtol=0.25)
+
+
+def test_columns_are_the_essential_ones_by_default():
+    simple = study(columns="essential", runs=2, delta=(1e-3,))
+    found = cestac(planar, record(noise=20.0), simple)
+    assert 3 < len(found.names) < 10
+    given = cestac(planar, record(noise=20.0), simple, columns=found.names)
+    assert given.to_json() == found.to_json()
+    with pytest.raises(SettingsError, match="ZZ9"):
+        cestac(planar, RECORD, study(columns=("ZZ9",)))
+
+
+def test_other_columns_are_not_evaluated_into_the_fit():
+    names = ("ZZ1R", "FS1", "ZZ2", "FV1")
+    found = cestac(planar, RECORD, study(columns=names, runs=2))
+    assert found.names == names and found.reference.names == names
+    assert len(found.levels[0].mean) == 4
+
+
+def test_torque_steps_alone_change_little_and_go_through_the_drives():
+    found = cestac(planar, RECORD, study(delta=(1e-3,), torque=(1e-3, 0.01)))
+    assert [result.level for result in found.levels] == [Level(1e-3), Level(0, 1e-3), Level(0, 0.01), Level(1e-3, 1e-3), Level(1e-3, 0.01)]
+    assert [result.level.label for result in found.levels][1:4:2] == ["Phi 0.001", "0.001 + Phi 0.001"]
+    alone, together = found.levels[1], found.levels[3]
+    assert np.nanmax(alone.e) < 1 < np.max(together.e)
+    assert alone.e_rho < 1
+    assert found.settings["torque_side"] == "motor"
+    drives = Drives.from_mapping(planar.DRIVES)
+    noise = perturbed_torque(RECORD.tau, Level(0, 0.01), study().cestac, drives, (1, 0)) - RECORD.tau
+    assert np.allclose(np.unique(np.round(noise @ np.linalg.inv(drives.ratio), 9)), [-0.01, 0.01])
+
+
+def test_torque_study_needs_no_position_step():
+    settings = CestacSettings(delta=(), torque=(0.01,))
+    assert levels_of(settings) == (Level(0.0, 0.01),)
+    found = cestac(planar, RECORD, replace(study(), cestac=replace(settings, columns="all")))
+    assert found.verdict in ("unbiased", "doubtful")
+
+
+def test_motor_side_divides_the_step_by_the_ratio():
+    drives = Drives.from_mapping(planar.DRIVES)
+    settings = study(side="motor").cestac
+    noise = perturbed_position(RECORD.q, Level(1e-3), settings, drives, (0, 0)) - RECORD.q
+    assert np.allclose(np.unique(np.round(noise @ drives.ratio.T, 9)), [-1e-3, 1e-3])
+    joint = cestac(planar, RECORD, study(delta=(1e-3,)))
+    motor = cestac(planar, RECORD, study(delta=(1e-3,), side="motor"))
+    assert motor.levels[0].e[0] < 0.05 < joint.levels[0].e[0]
+    blind = type(planar)("blind")
+    blind.__dict__.update({name: value for name, value in vars(planar).items() if not name.startswith("__")}, DRIVES=None)
+    with pytest.raises(SettingsError, match="no drives"):
+        cestac(blind, RECORD, study(side="motor"))
+    with pytest.raises(InputError, match="workers=0"):
+        cestac(blind, RECORD, study(), workers=1)
+
+
+def test_verdicts():
+    reference = estimate_like(relative_sigma=(1.0, 2.0, 30.0))
+    for e, verdict, names in (
+        ((0.3, 0.2, 60.0), "unbiased", {"a"}),
+        ((3.0, 0.2, 60.0), "doubtful", {"a"}),
+        ((7.0, 6.0, 60.0), "biased", {"a", "b"}),
+    ):
+        X = reference.X * (1 - np.array(e) / 100)
+        result = level_result(Level(1e-3), [Run(0, k, tuple(X), 1.0) for k in range(3)], Measured, reference)
+        assert result.verdict == verdict
+        assert set(result.decided_by) - {"rho"} == names
+        assert "Not deciding" in result.message and "c" in result.message.rsplit(":", 1)[1]
+    assert deciding_names(reference) == ("a", "b")
+
+
+class Measured:
+    """No rows matter here: the residual does not move with X."""
+
+    W = np.zeros((4, 3))
+    Y = np.ones(4)
+
+
+def estimate_like(relative_sigma):
+    """An Estimate of parameters a, b, c with the given %sigma."""
+    instants = np.arange(4.0)
+    full = estimate(Observation(np.eye(4, 3), np.ones(4), (4,), ("a", "b", "c"), instants, np.zeros(4, dtype=int), 1.0))
+    X = np.array([1.0, 2.0, 3.0])
+    return replace(full, X=X, sigma=np.array(relative_sigma) * X / 100, residual_norm=2.0)
+
+
+def test_runs_needed():
+    assert runs_needed(0.0) == 2
+    for spread in (0.5, 3.0, 20.0):
+        N = runs_needed(spread)
+        assert t.ppf(0.975, N - 1) * spread / np.sqrt(N) < 1 <= t.ppf(0.975, N - 2) * spread / np.sqrt(N - 1)
+
+
+def test_text_and_json(small):
+    data = json.loads(small.to_json(), parse_constant=lambda name: pytest.fail(name))
+    assert data["settings"]["rate"] == 1000.0 and data["settings"]["cestac"]["seed"] == 1
+    assert data["settings"]["signals"]["lowpass"]["cutoff"] == 20 and data["settings"]["factor"] == 20
+    assert data["provenance"]["seed"] == 1 and data["provenance"]["files"] == {"planar.csv": "cd" * 32}
+    assert len(data["levels"]) == 2 and data["levels"][0]["level"] == {"delta": 0.001, "torque": 0.0}
+    text = str(small)
+    assert "%e(rho), printed" in text and "verdict" in text
+    assert len(small.errors_table().splitlines()) == 11
+    assert Level(2 * np.pi / 5000).label == "2*pi/5000" and Level(0.0).label == "none"
+
+
+def test_reference_is_the_estimate_of_the_measured_record(small):
+    assert small.reference.provenance["robot"] == "planar_2r_test"
+    assert np.all(np.abs(small.reference.X - TRUE) < 6 * small.reference.sigma_corrected)
