@@ -26,6 +26,7 @@ def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]
     robot, closure, algebra = motion.robot, motion.geometry.closure, motion.algebra
     inertial, elements = inertial_names(robot), element_names(robot)
     axes = Axes(motion)
+    algebra.section("Contributions that several joints share")
     result: dict[str, dict[int, Scalar]] = {}
     for name in names:
         tree = axes.column(*inertial[name]) if name in inertial else element_column(motion, *elements[name])

@@ -60,8 +60,8 @@ class Geometry:
 
     def _frame(self, f: Frame) -> None:
         algebra, j = self.algebra, f.j
-        ca, sa = (algebra.constant(call(trig, f.alpha)) for trig in ("cos", "sin"))
-        cg, sg = (algebra.constant(call(trig, f.gamma)) for trig in ("cos", "sin"))
+        ca, sa = (algebra.name(algebra.constant(call(trig, f.alpha)), f"{trig[0].upper()}A{j}") for trig in ("cos", "sin"))
+        cg, sg = (algebra.name(algebra.constant(call(trig, f.gamma)), f"{trig[0].upper()}G{j}") for trig in ("cos", "sin"))
         A: Matrix = ((cg, -mul(sg, ca), mul(sg, sa)), (sg, mul(cg, ca), -mul(cg, sa)), (0, sa, ca))
         turn: Turn = ()
         offset = f.theta0
@@ -85,7 +85,8 @@ class Geometry:
         self._turn[j] = (turn, offset)
 
     def _rotation(self, A: Matrix | None, turn: Turn, offset: Expression) -> Rotation:
-        return Rotation(A, *self.algebra.cos_sin(turn, offset))
+        c, s = self.algebra.cos_sin(turn, offset)
+        return Rotation(A, c, s)
 
     def position(self, j: int) -> Scalar:
         """q_j of any moving joint, from the actuated ones."""

@@ -2,7 +2,7 @@
 
 A node is (op, operands); equal nodes are one object, so a shared sub-expression is computed once. Signs live on the edges: a
 `Scalar` is a node and a sign, negations are free and x and -x share everything. A node may carry a name given by the recursion that made it.
-Operations: sym, const (exact rational), add, mul, cos, sin, sign, pos (positive part max(x, 0)).
+Operations: sym, const (exact rational), add, mul, cos, sin, sign, pos (positive part max(x, 0)); sqrt and inv (1/x) of constants.
 """
 
 from __future__ import annotations
@@ -11,18 +11,21 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-SYM, CONST, ADD, MUL, COS, SIN, SIGN, POS = "sym", "const", "add", "mul", "cos", "sin", "sign", "pos"
-OPERATIONS = (ADD, MUL)
+SYM, CONST, ADD, MUL, COS, SIN, SIGN, POS, SQRT, INV = "sym", "const", "add", "mul", "cos", "sin", "sign", "pos", "sqrt", "inv"
 
 
 class Node:
-    """One operation of the graph. `operands` are Scalars; `fixed` nodes depend on no sample (constants and parameters only)."""
+    """One operation of the graph. `operands` are Scalars; `fixed` nodes depend on no sample (constants and parameters only).
 
-    __slots__ = ("fixed", "index", "name", "name_sign", "op", "operands", "value")
+    `name` is what the emitted line is called; `hint` is used for the name of a node that turns out to be shared and has none.
+    """
+
+    __slots__ = ("fixed", "hint", "index", "name", "name_sign", "op", "operands", "value")
 
     def __init__(self, index: int, op: str, operands: tuple[Scalar, ...], value: Any, fixed: bool) -> None:
         self.index, self.op, self.operands, self.value, self.fixed = index, op, operands, value, fixed
         self.name: str | None = None
+        self.hint: str | None = None
         self.name_sign = 1
 
     def __repr__(self) -> str:
@@ -56,6 +59,12 @@ class Scalar:
         return self.graph.add(self.graph.lift(other), -self)
 
     __rmul__ = __mul__
+
+    def __truediv__(self, other: Scalar) -> Scalar | int:
+        return self.graph.mul(self, self.graph.inverse(other))
+
+    def __rtruediv__(self, other: int) -> Scalar | int:
+        return self.graph.mul(self.graph.lift(other), self.graph.inverse(self))
 
     def __repr__(self) -> str:
         return f"{'-' if self.sign < 0 else ''}{self.node!r}"
@@ -132,10 +141,24 @@ class Graph:
         """max(x, 0)."""
         return self._scalar((POS, x.node.index, x.sign), POS, (x,), None, x.node.fixed)
 
+    def sqrt(self, x: Scalar) -> Scalar:
+        return self._scalar((SQRT, x.node.index, x.sign), SQRT, (x,), None, x.node.fixed)
+
+    def inverse(self, x: Scalar) -> Scalar:
+        """1/x."""
+        s = self._scalar((INV, x.node.index), INV, (_positive(x),), None, x.node.fixed)
+        return s if x.sign > 0 else -s
+
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
         """Call an operation `name`; the first name holds, inputs and numbers keep theirs."""
         if isinstance(value, Scalar) and value.node.name is None and value.node.op not in (SYM, CONST):
             value.node.name, value.node.name_sign = name, value.sign
+        return value
+
+    def hint(self, value: Scalar | int, name: str) -> Scalar | int:
+        """Suggest a name for an operation, to be used if it is needed more than once."""
+        if isinstance(value, Scalar) and value.node.name is None and value.node.hint is None and value.node.op not in (SYM, CONST):
+            value.node.hint, value.node.name_sign = name, value.sign
         return value
 
     def _scalar(self, key: tuple[Any, ...], op: str, operands: tuple[Scalar, ...], value: Any, fixed: bool) -> Scalar:

@@ -40,18 +40,23 @@ class LinkMotion:
 
 
 class Motion:
-    """Outward recursion. `moving` are the joints that may have a velocity and an acceleration, by default all.
+    """Outward recursion. q, qd, qdd of the actuated joints move the whole tree.
 
-    `gravity=False` leaves gravity out; the inertia matrix is this recursion at rest with one unit acceleration at a time.
+    `gravity`, `velocity`, `acceleration` leave their part out; `unit` = j moves actuated joint j alone, from rest, with qdd_j = 1 and
+    without gravity: a column of the inertia matrix. Its steps are named with j as last index.
     """
 
-    def __init__(self, geometry: Geometry, *, gravity: bool = True, velocity: bool = True, acceleration: tuple[int, ...] | None = None) -> None:
+    def __init__(
+        self, geometry: Geometry, *, gravity: bool = True, velocity: bool = True, acceleration: bool = True, unit: int | None = None
+    ) -> None:
         self.geometry, self.robot, self.algebra = geometry, geometry.robot, geometry.algebra
         self.named = Names(len(self.robot.frames))
-        self.gravity, self.velocity, self.acceleration = gravity, velocity, acceleration
-        self._qd = {i: self.algebra.qd(i) if velocity else 0 for i in self.robot.joints}
-        self._qdd = {i: self.algebra.qdd(i) if acceleration is None else int(i in acceleration) for i in self.robot.joints}
-        g = tuple(self.algebra.constant(-e) for e in self.robot.gravity) if gravity else ZERO3
+        self.gravity = gravity and unit is None
+        self.tag: tuple[int, ...] = () if unit is None else (unit,)
+        joints = self.robot.joints
+        self._qd = {i: self.algebra.qd(i) if velocity and unit is None else 0 for i in joints}
+        self._qdd = {i: int(i == unit) if unit is not None else self.algebra.qdd(i) if acceleration else 0 for i in joints}
+        g = tuple(self.algebra.constant(-e) for e in self.robot.gravity) if self.gravity else ZERO3
         self.link: dict[int, LinkMotion] = {0: LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, g)}  # type: ignore[arg-type]
         for f in self.robot.frames:
             self.link[f.j] = self._link(f.j)
@@ -70,11 +75,17 @@ class Motion:
 
     def vector(self, family: str, value: Vector, *indices: int) -> Vector:
         """The same vector, its components named family + component + indices."""
-        x, y, z = (self.algebra.name(v, self.named(family, k, *indices)) for k, v in enumerate(value, start=1))
+        x, y, z = (self.algebra.name(v, self.named(family, k, *indices, *self.tag)) for k, v in enumerate(value, start=1))
+        return x, y, z
+
+    def hinted(self, family: str, value: Vector, *indices: int) -> Vector:
+        """The same vector, its components to be named so if they are used more than once."""
+        x, y, z = (self.algebra.hint(v, self.named(family, k, *indices, *self.tag)) for k, v in enumerate(value, start=1))
         return x, y, z
 
     def _link(self, j: int) -> LinkMotion:
         f, geometry = self.robot.frame(j), self.geometry
+        self.algebra.section(f"Link {j}")
         carrier = geometry.carrier[j]
         inner, i = self.link[carrier.m], self.link[f.ant]
         rate: Scalar = 0
@@ -96,12 +107,12 @@ class Motion:
 
     def _products(self, w: Vector, wd: Vector, j: int) -> tuple[Matrix, Vector, Matrix]:
         name, named = self.algebra.name, self.named
-        D = {(k, m): name(mul(w[k], w[m]), named("DV", k + 1, m + 1, j)) for k in range(3) for m in range(k, 3)}
+        D = {(k, m): name(mul(w[k], w[m]), named("DV", k + 1, m + 1, j, *self.tag)) for k in range(3) for m in range(k, 3)}
         DV: Matrix = tuple(tuple(D[min(k, m), max(k, m)] for m in range(3)) for k in range(3))  # type: ignore[assignment]
-        DW = tuple(name(sub(DV[k][k], DV[m][m]), named("DW", k + 1, m + 1, j)) for k, m in ((1, 2), (2, 0), (0, 1)))
+        DW = tuple(name(sub(DV[k][k], DV[m][m]), named("DW", k + 1, m + 1, j, *self.tag)) for k, m in ((1, 2), (2, 0), (0, 1)))
 
         def off(k: int, m: int, value: Scalar) -> Scalar:
-            return name(value, named("U", k, m, j))
+            return name(value, named("U", k, m, j, *self.tag))
 
         U: Matrix = (
             (off(1, 1, -add(DV[1][1], DV[2][2])), off(1, 2, sub(DV[0][1], wd[2])), off(1, 3, add(DV[0][2], wd[1]))),
@@ -142,6 +153,7 @@ def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
     torque: dict[int, Scalar] = {}
     for frame in reversed(robot.frames):
         j, i = frame.j, frame.ant
+        motion.algebra.section(f"Joint {j}")
         link = {p: K.get(parameter(p, j), 0) for p in INERTIAL}
         f[j] = vector("E", vadd(vector("F", force(motion.link[j], link), j), f[j]), j)
         n[j] = vector("NE", vadd(vector("N", moment(motion.link[j], link), j), n[j]), j)

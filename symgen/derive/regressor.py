@@ -56,6 +56,7 @@ class Axes:
         motion, geometry, robot = self.motion, self.motion.geometry, self.motion.robot
         frame = robot.frame(j)
         m = geometry.carrier[j].m
+        motion.algebra.section(f"Joint axes Z and velocities V seen from link {j}")
         for i in robot.path(j)[:-1]:
             sigma = robot.frame(i).sigma
             if sigma == FIXED:
@@ -64,7 +65,7 @@ class Axes:
             if sigma == REVOLUTE:
                 z = geometry.carried(j, self.z[i, m]) if inside else E3
                 lever = vadd(self.v[i, frame.ant], cross(self.z[i, frame.ant], geometry.P[j]))
-                v = geometry.rotation[j].down(lever)
+                v = geometry.rotation[j].down(motion.hinted("VS", lever, j, i))
             else:
                 z = ZERO3
                 v = geometry.carried(j, self.v[i, m]) if inside else E3
@@ -76,8 +77,11 @@ class Axes:
     def column(self, parameter: str, j: int) -> dict[int, Scalar]:
         """{i: D_ik} of an inertial parameter of link j, i over the moving joints that carry it."""
         F, N = unit_wrench(self.motion.link[j], parameter)
-        path = [i for i in self.motion.robot.path(j) if self.motion.robot.frame(i).sigma != FIXED]
-        return {i: add(dot(self.z[i, j], N), dot(self.v[i, j], F)) for i in path}
-
-
-
+        motion = self.motion
+        entries: dict[int, Scalar] = {}
+        for i in motion.robot.path(j):
+            if motion.robot.frame(i).sigma != FIXED:
+                turning = motion.algebra.hint(dot(self.z[i, j], N), f"{motion.named('DN', i)}{parameter}{j}")
+                pushing = motion.algebra.hint(dot(self.v[i, j], F), f"{motion.named('DF', i)}{parameter}{j}")
+                entries[i] = motion.algebra.hint(add(turning, pushing), f"{motion.named('DG', i)}{parameter}{j}")
+        return entries

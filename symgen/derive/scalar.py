@@ -56,6 +56,14 @@ class Algebra(Protocol):
         """The same value, known as `name` from here on."""
         ...
 
+    def hint(self, value: Scalar, name: str) -> Scalar:
+        """The same value, to be called `name` if it is used more than once."""
+        ...
+
+    def section(self, title: str) -> None:
+        """What follows belongs under this heading."""
+        ...
+
 
 def neg(a: Scalar) -> Scalar:
     return -a

@@ -272,6 +272,11 @@ class Draw:
     def name(self, value: Scalar, name: str) -> Scalar:
         return value
 
+    hint = name
+
+    def section(self, title: str) -> None:
+        pass
+
 
 def rref(M: Array, p: int) -> tuple[list[int], Array]:
     """Pivot columns (leftmost first) and the reduced rows, shape (rank, columns), of M over F_p."""

@@ -199,6 +199,11 @@ class FractionField:
     def name(self, value: Scalar, name: str) -> Scalar:
         return value
 
+    hint = name
+
+    def section(self, title: str) -> None:
+        pass
+
     def solve(self, rows: list[list[Any]], wanted: int, dependent: str) -> list[Expression]:
         from sympy.polys.matrices import DomainMatrix
 

@@ -1,0 +1,2129 @@
+"""Franka Emika Panda, 7 revolute joints: base parameters, regressor, dynamics.
+
+GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.1.0. Do not edit; symgen generate panda
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+    j  ant  sigma  alpha    d  theta    r
+    1    0      0      0    0     q1  RL1
+    2    1      0  -pi/2    0     q2    0
+    3    2      0   pi/2    0     q3  RL3
+    4    3      0   pi/2   D4     q4    0
+    5    4      0  -pi/2  -D4     q5  RL5
+    6    5      0   pi/2    0     q6    0
+    7    6      0   pi/2   D7     q7    0
+Gravity     acceleration (0, 0, -g) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1, q2, q3, q4, q5, q6, q7
+Element     FV      viscous: along q1, q2, q3, q4, q5, q6, q7
+Element     FS      coulomb: along q1, q2, q3, q4, q5, q6, q7
+Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6, q7
+
+Base parameters, 69 of 98; Gautier and Khalil (1990), exact
+    ZZ1R = ZZ1 + Ia1 + YY2
+    XX2R = XX2 - YY2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
+    ZZ2R = ZZ2 + Ia2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
+    MY2R = MY2 - MZ3 - RL3*(M3 + M4 + M5 + M6 + M7)
+    XX3R = XX3 - YY3 + YY4 - D4**2*M4
+    XY3R = XY3 + D4*MZ4
+    ZZ3R = ZZ3 + YY4 + D4**2*M4 + 2*D4**2*(M5 + M6 + M7)
+    MX3R = MX3 + D4*(M4 + M5 + M6 + M7)
+    MY3R = MY3 - MZ4
+    XX4R = XX4 - YY4 + YY5 + 2*RL5*MZ5 + (-D4**2 + RL5**2)*(M5 + M6 + M7)
+    XY4R = XY4 + D4*MZ5 + D4*RL5*(M5 + M6 + M7)
+    ZZ4R = ZZ4 + YY5 + 2*RL5*MZ5 + (D4**2 + RL5**2)*(M5 + M6 + M7)
+    MX4R = MX4 - D4*(M5 + M6 + M7)
+    MY4R = MY4 + MZ5 + RL5*(M5 + M6 + M7)
+    XX5R = XX5 - YY5 + YY6 + D7**2*M7
+    ZZ5R = ZZ5 + YY6 + D7**2*M7
+    MY5R = MY5 - MZ6
+    XX6R = XX6 - YY6 + YY7 - D7**2*M7
+    XY6R = XY6 + D7*MZ7
+    ZZ6R = ZZ6 + YY7 + D7**2*M7
+    MX6R = MX6 + D7*M7
+    MY6R = MY6 - MZ7
+    XX7R = XX7 - YY7
+    as they are: FV1 FS1 OFFSET1 XY2 XZ2 YZ2 MX2 FV2 FS2 OFFSET2 XZ3 YZ3 Ia3 FV3 FS3 OFFSET3 XZ4 YZ4 Ia4 FV4 FS4 OFFSET4
+        XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5 OFFSET5 XZ6 YZ6 Ia6 FV6 FS6 OFFSET6 XY7 XZ7 YZ7 ZZ7 MX7 MY7 Ia7 FV7 FS7 OFFSET7
+No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
+
+Cost per sample
+    regressor         684 multiplications, 497 additions, 6 sin, 6 cos
+    inverse_dynamics  333 multiplications, 323 additions, 6 sin, 6 cos
+    inertia_matrix    572 multiplications, 416 additions, 6 sin, 6 cos
+    bias              322 multiplications, 299 additions, 6 sin, 6 cos
+    gravity           64 multiplications, 45 additions, 6 sin, 6 cos
+    frame_poses       77 multiplications, 41 additions, 7 sin, 7 cos
+"""
+
+import numpy as np
+
+SCHEMA = 1
+NAME = 'panda'
+SOURCE_SHA256 = '69d8ce994a1a6da19a1e7c019c757c841da3b362c433aeebbc97846fc2eef261'
+JOINTS = (1, 2, 3, 4, 5, 6, 7)
+CONSTANTS = {'RL1': 0.333, 'RL3': 0.316, 'D4': 0.0825, 'RL5': 0.384, 'D7': 0.088, 'g': 9.81}
+BASE_PARAMETERS = (
+    'ZZ1R', 'FV1', 'FS1', 'OFFSET1', 'XX2R', 'XY2', 'XZ2', 'YZ2', 'ZZ2R', 'MX2', 'MY2R', 'FV2', 'FS2', 'OFFSET2',
+    'XX3R', 'XY3R', 'XZ3', 'YZ3', 'ZZ3R', 'MX3R', 'MY3R', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4R', 'XY4R', 'XZ4', 'YZ4',
+    'ZZ4R', 'MX4R', 'MY4R', 'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX5R', 'XY5', 'XZ5', 'YZ5', 'ZZ5R', 'MX5', 'MY5R', 'Ia5',
+    'FV5', 'FS5', 'OFFSET5', 'XX6R', 'XY6R', 'XZ6', 'YZ6', 'ZZ6R', 'MX6R', 'MY6R', 'Ia6', 'FV6', 'FS6', 'OFFSET6',
+    'XX7R', 'XY7', 'XZ7', 'YZ7', 'ZZ7', 'MX7', 'MY7', 'Ia7', 'FV7', 'FS7', 'OFFSET7',
+)
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
+    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4',
+    'MX4', 'MY4', 'MZ4', 'M4', 'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX5', 'XY5', 'XZ5', 'YY5', 'YZ5', 'ZZ5', 'MX5', 'MY5',
+    'MZ5', 'M5', 'Ia5', 'FV5', 'FS5', 'OFFSET5', 'XX6', 'XY6', 'XZ6', 'YY6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'MZ6', 'M6',
+    'Ia6', 'FV6', 'FS6', 'OFFSET6', 'XX7', 'XY7', 'XZ7', 'YY7', 'YZ7', 'ZZ7', 'MX7', 'MY7', 'MZ7', 'M7', 'Ia7', 'FV7',
+    'FS7', 'OFFSET7',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m', 'XX2R': 'kg*m**2', 'XY2': 'kg*m**2',
+    'XZ2': 'kg*m**2', 'YZ2': 'kg*m**2', 'ZZ2R': 'kg*m**2', 'MX2': 'kg*m', 'MY2R': 'kg*m', 'FV2': 'N*m*s/rad',
+    'FS2': 'N*m', 'OFFSET2': 'N*m', 'XX3R': 'kg*m**2', 'XY3R': 'kg*m**2', 'XZ3': 'kg*m**2', 'YZ3': 'kg*m**2',
+    'ZZ3R': 'kg*m**2', 'MX3R': 'kg*m', 'MY3R': 'kg*m', 'Ia3': 'kg*m**2', 'FV3': 'N*m*s/rad', 'FS3': 'N*m',
+    'OFFSET3': 'N*m', 'XX4R': 'kg*m**2', 'XY4R': 'kg*m**2', 'XZ4': 'kg*m**2', 'YZ4': 'kg*m**2', 'ZZ4R': 'kg*m**2',
+    'MX4R': 'kg*m', 'MY4R': 'kg*m', 'Ia4': 'kg*m**2', 'FV4': 'N*m*s/rad', 'FS4': 'N*m', 'OFFSET4': 'N*m',
+    'XX5R': 'kg*m**2', 'XY5': 'kg*m**2', 'XZ5': 'kg*m**2', 'YZ5': 'kg*m**2', 'ZZ5R': 'kg*m**2', 'MX5': 'kg*m',
+    'MY5R': 'kg*m', 'Ia5': 'kg*m**2', 'FV5': 'N*m*s/rad', 'FS5': 'N*m', 'OFFSET5': 'N*m', 'XX6R': 'kg*m**2',
+    'XY6R': 'kg*m**2', 'XZ6': 'kg*m**2', 'YZ6': 'kg*m**2', 'ZZ6R': 'kg*m**2', 'MX6R': 'kg*m', 'MY6R': 'kg*m',
+    'Ia6': 'kg*m**2', 'FV6': 'N*m*s/rad', 'FS6': 'N*m', 'OFFSET6': 'N*m', 'XX7R': 'kg*m**2', 'XY7': 'kg*m**2',
+    'XZ7': 'kg*m**2', 'YZ7': 'kg*m**2', 'ZZ7': 'kg*m**2', 'MX7': 'kg*m', 'MY7': 'kg*m', 'Ia7': 'kg*m**2',
+    'FV7': 'N*m*s/rad', 'FS7': 'N*m', 'OFFSET7': 'N*m',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + YY2', 'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1',
+    'XX2R': 'XX2 - YY2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)', 'XY2': 'XY2',
+    'XZ2': 'XZ2', 'YZ2': 'YZ2',
+    'ZZ2R': 'ZZ2 + Ia2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)', 'MX2': 'MX2',
+    'MY2R': 'MY2 - MZ3 - RL3*(M3 + M4 + M5 + M6 + M7)', 'FV2': 'FV2', 'FS2': 'FS2', 'OFFSET2': 'OFFSET2',
+    'XX3R': 'XX3 - YY3 + YY4 - D4**2*M4', 'XY3R': 'XY3 + D4*MZ4', 'XZ3': 'XZ3', 'YZ3': 'YZ3',
+    'ZZ3R': 'ZZ3 + YY4 + D4**2*M4 + 2*D4**2*(M5 + M6 + M7)', 'MX3R': 'MX3 + D4*(M4 + M5 + M6 + M7)',
+    'MY3R': 'MY3 - MZ4', 'Ia3': 'Ia3', 'FV3': 'FV3', 'FS3': 'FS3', 'OFFSET3': 'OFFSET3',
+    'XX4R': 'XX4 - YY4 + YY5 + 2*RL5*MZ5 + (-D4**2 + RL5**2)*(M5 + M6 + M7)',
+    'XY4R': 'XY4 + D4*MZ5 + D4*RL5*(M5 + M6 + M7)', 'XZ4': 'XZ4', 'YZ4': 'YZ4',
+    'ZZ4R': 'ZZ4 + YY5 + 2*RL5*MZ5 + (D4**2 + RL5**2)*(M5 + M6 + M7)', 'MX4R': 'MX4 - D4*(M5 + M6 + M7)',
+    'MY4R': 'MY4 + MZ5 + RL5*(M5 + M6 + M7)', 'Ia4': 'Ia4', 'FV4': 'FV4', 'FS4': 'FS4', 'OFFSET4': 'OFFSET4',
+    'XX5R': 'XX5 - YY5 + YY6 + D7**2*M7', 'XY5': 'XY5', 'XZ5': 'XZ5', 'YZ5': 'YZ5', 'ZZ5R': 'ZZ5 + YY6 + D7**2*M7',
+    'MX5': 'MX5', 'MY5R': 'MY5 - MZ6', 'Ia5': 'Ia5', 'FV5': 'FV5', 'FS5': 'FS5', 'OFFSET5': 'OFFSET5',
+    'XX6R': 'XX6 - YY6 + YY7 - D7**2*M7', 'XY6R': 'XY6 + D7*MZ7', 'XZ6': 'XZ6', 'YZ6': 'YZ6',
+    'ZZ6R': 'ZZ6 + YY7 + D7**2*M7', 'MX6R': 'MX6 + D7*M7', 'MY6R': 'MY6 - MZ7', 'Ia6': 'Ia6', 'FV6': 'FV6',
+    'FS6': 'FS6', 'OFFSET6': 'OFFSET6', 'XX7R': 'XX7 - YY7', 'XY7': 'XY7', 'XZ7': 'XZ7', 'YZ7': 'YZ7', 'ZZ7': 'ZZ7',
+    'MX7': 'MX7', 'MY7': 'MY7', 'Ia7': 'Ia7', 'FV7': 'FV7', 'FS7': 'FS7', 'OFFSET7': 'OFFSET7',
+}
+NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'MZ2', 'M2')
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x......", "x......", "x......", "x......", "xx.....", "xx.....", "xx.....", "xx.....", ".x.....", ".x.....",
+    ".x.....", ".x.....", ".x.....", ".x.....", "xxx....", "xxx....", "xxx....", "xxx....", "xxx....", "xxx....",
+    "xxx....", "..x....", "..x....", "..x....", "..x....", "xxxx...", "xxxx...", "xxxx...", "xxxx...", "xxxx...",
+    "xxxx...", "xxxx...", "...x...", "...x...", "...x...", "...x...", "xxxxx..", "xxxxx..", "xxxxx..", "xxxxx..",
+    "xxxxx..", "xxxxx..", "xxxxx..", "....x..", "....x..", "....x..", "....x..", "xxxxxx.", "xxxxxx.", "xxxxxx.",
+    "xxxxxx.", "xxxxxx.", "xxxxxx.", "xxxxxx.", ".....x.", ".....x.", ".....x.", ".....x.", "xxxxxxx", "xxxxxxx",
+    "xxxxxxx", "xxxxxxx", "xxxxxxx", "xxxxxxx", "xxxxxxx", "......x", "......x", "......x", "......x",
+)])
+DRIVES = None
+LIMITS = {
+    'q': ((-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698), (-2.8973, 2.8973), (-0.0175, 3.7525), (-2.8973, 2.8973)),
+    'qd': (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61), 'qdd': (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),
+    'tau': (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
+}
+VALUES = {}
+_PATHS = {
+    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
+    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),))),
+    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
+    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),))),
+    6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),))),
+    7: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),)), (7, 0, ((6, 1.0),))),
+}
+
+
+class Store(np.ndarray):
+    """Room for a regressor, made by `store`; views and copies of one are no stores."""
+
+    ready = False
+
+    def __array_finalize__(self, parent):
+        self.ready = False
+
+
+def store(N):
+    """Room for N samples, shape (69, 7, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
+    S = np.zeros((69, 7, N)).view(Store)
+    S[3, 0] = 1.0
+    S[13, 1] = 1.0
+    S[24, 2] = 1.0
+    S[35, 3] = 1.0
+    S[46, 4] = 1.0
+    S[57, 5] = 1.0
+    S[68, 6] = 1.0
+    S.ready = True
+    return S
+
+
+def _fill(block, result, states, *arguments):
+    """Run `block` over 4096 samples at a time; states (N, 7) enter as contiguous rows (7, B), result ends in samples."""
+    states = [np.asarray(x, dtype=float).reshape(-1, 7) for x in states]
+    N = len(states[0])
+    B = max(N, 1) if N <= 8192 else 4096
+    for t in range(0, N, B):
+        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+    return result
+
+
+def _filled_store(q, qd, qdd, out, *constants):
+    N = np.size(q) // 7
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (69, 7, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(69, 7, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
+
+
+def _by_sample(result, q):
+    """Samples first; for a single state (n,) without them."""
+    result = np.moveaxis(result, -1, 0)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def base_parameters(standard, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """X, shape (69,), from the 98 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
+        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5,
+        M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7,
+        XZ7, YY7, YZ7, ZZ7, MX7, MY7, MZ7, M7, Ia7, FV7, FS7, OFFSET7
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + YY2
+    XX2R = XX2 - YY2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
+    ZZ2R = ZZ2 + Ia2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
+    MY2R = MY2 - MZ3 - RL3*(M3 + M4 + M5 + M6 + M7)
+    XX3R = XX3 - YY3 + YY4 - D4**2*M4
+    XY3R = XY3 + D4*MZ4
+    ZZ3R = ZZ3 + YY4 + D4**2*M4 + 2*D4**2*(M5 + M6 + M7)
+    MX3R = MX3 + D4*(M4 + M5 + M6 + M7)
+    MY3R = MY3 - MZ4
+    XX4R = XX4 - YY4 + YY5 + 2*RL5*MZ5 + (-D4**2 + RL5**2)*(M5 + M6 + M7)
+    XY4R = XY4 + D4*MZ5 + D4*RL5*(M5 + M6 + M7)
+    ZZ4R = ZZ4 + YY5 + 2*RL5*MZ5 + (D4**2 + RL5**2)*(M5 + M6 + M7)
+    MX4R = MX4 - D4*(M5 + M6 + M7)
+    MY4R = MY4 + MZ5 + RL5*(M5 + M6 + M7)
+    XX5R = XX5 - YY5 + YY6 + D7**2*M7
+    ZZ5R = ZZ5 + YY6 + D7**2*M7
+    MY5R = MY5 - MZ6
+    XX6R = XX6 - YY6 + YY7 - D7**2*M7
+    XY6R = XY6 + D7*MZ7
+    ZZ6R = ZZ6 + YY7 + D7**2*M7
+    MX6R = MX6 + D7*M7
+    MY6R = MY6 - MZ7
+    XX7R = XX7 - YY7
+    return np.array([
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2, YZ2, ZZ2R, MX2, MY2R, FV2, FS2, OFFSET2, XX3R, XY3R, XZ3, YZ3, ZZ3R, MX3R,
+        MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4, YZ4, ZZ4R, MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5,
+        ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6R, XZ6, YZ6, ZZ6R, MX6R, MY6R, Ia6, FV6, FS6, OFFSET6, XX7R, XY7,
+        XZ7, YZ7, ZZ7, MX7, MY7, Ia7, FV7, FS7, OFFSET7,
+    ])
+
+
+def regressor(q, qd, qdd, *, out=None, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """D of Gamma = D X, shape (N, 7, 69); q, qd, qdd of shape (N, 7) or (7,), rad or m and seconds.
+
+    A view on one store of shape (69, 7, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
+    faults, up to several times the arithmetic for large N.
+    """
+    S = _filled_store(q, qd, qdd, out, RL1, RL3, D4, RL5, D7, g)
+    D = S.transpose(2, 1, 0)
+    return D[0] if np.ndim(q) == 1 else D
+
+
+def observation_matrix(q, qd, qdd, *, out=None, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """W of Y = W X + rho, shape (7*N, 69), Fortran order, rows joint-major: the same store, no copy."""
+    return _filled_store(q, qd, qdd, out, RL1, RL3, D4, RL5, D7, g).reshape(69, -1).T
+
+
+def inverse_dynamics(q, qd, qdd, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """Joint torques Gamma, shape (N, 7), of base parameters X, shape (69,)."""
+    return _by_sample(_fill(_inverse_dynamics_block, np.empty((7, np.size(q) // 7)), (q, qd, qdd), X, RL1, RL3, D4, RL5, D7, g), q)
+
+
+def inertia_matrix(q, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """A(q), shape (N, 7, 7), actuators included."""
+    return _by_sample(_fill(_inertia_matrix_block, np.empty((7, 7, np.size(q) // 7)), (q,), X, RL1, RL3, D4, RL5, D7, g), q)
+
+
+def bias(q, qd, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """Gamma at qdd = 0, shape (N, 7): Coriolis, centrifugal, gravity, friction and offset."""
+    return _by_sample(_fill(_bias_block, np.empty((7, np.size(q) // 7)), (q, qd), X, RL1, RL3, D4, RL5, D7, g), q)
+
+
+def gravity(q, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """Gamma at rest without friction, shape (N, 7): gravity, offset and springs (a base parameter may mix them)."""
+    return _by_sample(_fill(_gravity_block, np.empty((7, np.size(q) // 7)), (q,), X, RL1, RL3, D4, RL5, D7, g), q)
+
+
+def forward_dynamics(q, qd, tau, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """qdd = A(q)**-1 (tau - bias), shape (N, 7)."""
+    A, H = inertia_matrix(q, X, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g), bias(q, qd, X, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g)
+    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """Homogeneous transform of every frame j in frame 0, shape (N, 7, 4, 4), at index j - 1."""
+    T = np.zeros((7, 4, 4, np.size(q) // 7))
+    T[:, 3, 3] = 1.0
+    return _by_sample(_fill(_frame_poses_block, T, (q,), RL1, RL3, D4, RL5, D7, g), q)
+
+
+def jacobian(q, *, frame=7, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+    """J, shape (N, 6, 7): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g).reshape(-1, 7, 4, 4)
+    J = np.zeros((len(T), 6, 7))
+    P = T[:, (7 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[7 if frame is None else frame]:
+        z = T[:, j - 1, :3, 2]
+        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
+        for k, rate in rates:
+            J[:, :3, k] += rate * v
+            J[:, 3:, k] += rate * w
+    return J[0] if np.ndim(q) == 1 else J
+
+
+def _regressor_block(q, qd, qdd, D, RL1, RL3, D4, RL5, D7, g):
+    """Fill D, shape (69, 7, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (7, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    q7 = q[6]
+    QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
+    QDP1, QDP2, QDP3, QDP4, QDP5, QDP6, QDP7 = qdd
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    U232 = S2*QDP1
+    U132 = -C2*QDP1
+    DV232 = QP2*W22
+    WP12 = DV232 - U232
+    DV132 = QP2*W12
+    WP22 = U132 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U122 = DV122 - QDP2
+    U212 = QDP2 + DV122
+    U222 = -DV112 - DV332
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 3
+    W13 = C3*W12 + S3*QP2
+    W23 = C3*QP2 - S3*W12
+    W33 = QP3 - W22
+    WP13 = C3*WP12 + S3*QDP2 + QP3*W23
+    WP23 = C3*QDP2 - S3*WP12 - QP3*W13
+    WP33 = QDP3 - WP22
+    DV113 = W13**2
+    DV123 = W13*W23
+    DV133 = W13*W33
+    DV223 = W23**2
+    DV233 = W23*W33
+    DV333 = W33**2
+    DW233 = DV223 - DV333
+    DW313 = DV333 - DV113
+    DW123 = DV113 - DV223
+    U113 = -DV223 - DV333
+    U123 = DV123 - WP33
+    U133 = WP23 + DV133
+    U213 = WP33 + DV123
+    U223 = -DV113 - DV333
+    U233 = DV233 - WP13
+    U313 = DV133 - WP23
+    U323 = WP13 + DV233
+    VSP33 = -RL3*U322
+    VSP13 = VP12 - RL3*U122
+    VSP23 = VP22 - RL3*U222
+    VP13 = C3*VSP13 + S3*VSP33
+    VP23 = C3*VSP33 - S3*VSP13
+    # Link 4
+    W14 = C4*W13 + S4*W33
+    W24 = C4*W33 - S4*W13
+    W34 = QP4 - W23
+    WP14 = C4*WP13 + S4*WP33 + QP4*W24
+    WP24 = C4*WP33 - S4*WP13 - QP4*W14
+    WP34 = QDP4 - WP23
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = DV124 - WP34
+    U134 = WP24 + DV134
+    U214 = WP34 + DV124
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VSP14 = VP13 + D4*U113
+    VSP24 = VP23 + D4*U213
+    VSP34 = D4*U313 - VSP23
+    VP14 = C4*VSP14 + S4*VSP34
+    VP24 = C4*VSP34 - S4*VSP14
+    # Link 5
+    W15 = C5*W14 - S5*W34
+    W25 = -C5*W34 - S5*W14
+    W35 = QP5 + W24
+    WP15 = C5*WP14 + QP5*W25 - S5*WP34
+    WP25 = -C5*WP34 - S5*WP14 - QP5*W15
+    WP35 = QDP5 + WP24
+    DV115 = W15**2
+    DV125 = W15*W25
+    DV135 = W15*W35
+    DV225 = W25**2
+    DV235 = W25*W35
+    DV335 = W35**2
+    DW235 = DV225 - DV335
+    DW315 = DV335 - DV115
+    DW125 = DV115 - DV225
+    U115 = -DV225 - DV335
+    U125 = DV125 - WP35
+    U135 = WP25 + DV135
+    U215 = WP35 + DV125
+    U225 = -DV115 - DV335
+    U235 = DV235 - WP15
+    U315 = DV135 - WP25
+    U325 = WP15 + DV235
+    DF3MX4 = -D4*U314
+    VSP15 = VP14 + RL5*U124 - D4*U114
+    VSP25 = VP24 + RL5*U224 - D4*U214
+    VSP35 = DF3MX4 + RL5*U324 - VSP24
+    VP15 = C5*VSP15 - S5*VSP35
+    VP25 = -C5*VSP35 - S5*VSP15
+    # Link 6
+    W16 = C6*W15 + S6*W35
+    W26 = C6*W35 - S6*W15
+    W36 = QP6 - W25
+    WP16 = C6*WP15 + S6*WP35 + QP6*W26
+    WP26 = C6*WP35 - S6*WP15 - QP6*W16
+    WP36 = QDP6 - WP25
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV136 = W16*W36
+    DV226 = W26**2
+    DV236 = W26*W36
+    DV336 = W36**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = DV126 - WP36
+    U136 = WP26 + DV136
+    U216 = WP36 + DV126
+    U226 = -DV116 - DV336
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = WP16 + DV236
+    VP16 = C6*VP15 + S6*VSP25
+    VP26 = C6*VSP25 - S6*VP15
+    # Link 7
+    W17 = C7*W16 + S7*W36
+    W27 = C7*W36 - S7*W16
+    W37 = QP7 - W26
+    WP17 = C7*WP16 + S7*WP36 + QP7*W27
+    WP27 = C7*WP36 - S7*WP16 - QP7*W17
+    WP37 = QDP7 - WP26
+    DV117 = W17**2
+    DV127 = W17*W27
+    DV137 = W17*W37
+    DV227 = W27**2
+    DV237 = W27*W37
+    DV337 = W37**2
+    DW237 = DV227 - DV337
+    DW317 = DV337 - DV117
+    DW127 = DV117 - DV227
+    U117 = -DV227 - DV337
+    U127 = DV127 - WP37
+    U137 = WP27 + DV137
+    U217 = WP37 + DV127
+    U227 = -DV117 - DV337
+    U237 = DV237 - WP17
+    U317 = DV137 - WP27
+    U327 = WP17 + DV237
+    VSP17 = VP16 + D7*U116
+    VSP27 = VP26 + D7*U216
+    VSP37 = D7*U316 - VP25
+    VP17 = C7*VSP17 + S7*VSP37
+    VP27 = C7*VSP37 - S7*VSP17
+    # Joint axes Z and velocities V seen from link 3
+    Z131 = -S2*C3
+    Z231 = S2*S3
+    VS331 = RL3*S2
+    V131 = S3*VS331
+    V231 = C3*VS331
+    V132 = RL3*C3
+    V232 = -RL3*S3
+    # Joint axes Z and velocities V seen from link 4
+    Z141 = C4*Z131 + C2*S4
+    Z241 = C2*C4 - S4*Z131
+    VS341 = -D4*Z231
+    V341 = -V231 - D4*C2
+    V141 = C4*V131 + S4*VS341
+    V241 = C4*VS341 - S4*V131
+    Z142 = S3*C4
+    Z242 = -S3*S4
+    VS342 = -D4*C3
+    V142 = C4*V132 + S4*VS342
+    V242 = C4*VS342 - S4*V132
+    # Joint axes Z and velocities V seen from link 5
+    Z151 = C5*Z141 + S5*Z231
+    Z251 = C5*Z231 - S5*Z141
+    VS151 = V141 + RL5*Z231
+    V351 = V241 - VS341
+    VS351 = V341 + RL5*Z141 + D4*Z241
+    V151 = C5*VS151 - S5*VS351
+    V251 = -C5*VS351 - S5*VS151
+    Z152 = C5*Z142 + C3*S5
+    Z252 = C3*C5 - S5*Z142
+    VS152 = V142 + RL5*C3
+    V352 = V242 - VS342
+    VS352 = RL5*Z142 + D4*Z242 - V232
+    V152 = C5*VS152 - S5*VS352
+    V252 = -C5*VS352 - S5*VS152
+    Z153 = S4*C5
+    Z253 = -S4*S5
+    VS353 = RL5*S4 + D4*C4 - D4
+    V153 = -S5*VS353
+    V253 = -C5*VS353
+    V154 = -RL5*C5
+    V254 = RL5*S5
+    # Joint axes Z and velocities V seen from link 6
+    Z161 = C6*Z151 + S6*Z241
+    Z261 = C6*Z241 - S6*Z151
+    V161 = C6*V151 + S6*V351
+    V261 = C6*V351 - S6*V151
+    Z162 = C6*Z152 + S6*Z242
+    Z262 = C6*Z242 - S6*Z152
+    V162 = C6*V152 + S6*V352
+    V262 = C6*V352 - S6*V152
+    Z163 = C6*Z153 + C4*S6
+    Z263 = C4*C6 - S6*Z153
+    V163 = C6*V153
+    V263 = -S6*V153
+    Z164 = -S5*C6
+    Z264 = S5*S6
+    V164 = C6*V154 - D4*S6
+    V264 = -D4*C6 - S6*V154
+    # Joint axes Z and velocities V seen from link 7
+    Z171 = C7*Z161 - S7*Z251
+    Z271 = -C7*Z251 - S7*Z161
+    V371 = D7*Z251 - V261
+    VS371 = -V251 - D7*Z261
+    V171 = C7*V161 + S7*VS371
+    V271 = C7*VS371 - S7*V161
+    Z172 = C7*Z162 - S7*Z252
+    Z272 = -C7*Z252 - S7*Z162
+    V372 = D7*Z252 - V262
+    VS372 = -V252 - D7*Z262
+    V172 = C7*V162 + S7*VS372
+    V272 = C7*VS372 - S7*V162
+    Z173 = C7*Z163 - S7*Z253
+    Z273 = -C7*Z253 - S7*Z163
+    V373 = D7*Z253 - V263
+    VS373 = -V253 - D7*Z263
+    V173 = C7*V163 + S7*VS373
+    V273 = C7*VS373 - S7*V163
+    Z174 = C7*Z164 + C5*S7
+    Z274 = C5*C7 - S7*Z164
+    V374 = -V264 - D7*C5
+    VS374 = -V254 - D7*Z264
+    V174 = C7*V164 + S7*VS374
+    V274 = C7*VS374 - S7*V164
+    Z175 = S6*C7
+    Z275 = -S6*S7
+    VS375 = -D7*C6
+    V175 = S7*VS375
+    V275 = C7*VS375
+    # Contributions that several joints share
+    DV133Z231 = DV133*Z231
+    C3DV133 = C3*DV133
+    DV134Z241 = DV134*Z241
+    DV134Z242 = DV134*Z242
+    C4DV134 = C4*DV134
+    DV135Z251 = DV135*Z251
+    DV135Z252 = DV135*Z252
+    DV135Z253 = DV135*Z253
+    C5DV135 = C5*DV135
+    DV136Z261 = DV136*Z261
+    DV136Z262 = DV136*Z262
+    DV136Z263 = DV136*Z263
+    DV136Z264 = DV136*Z264
+    C6DV136 = C6*DV136
+    DV137Z271 = DV137*Z271
+    DV137Z272 = DV137*Z272
+    DV137Z273 = DV137*Z273
+    DV137Z274 = DV137*Z274
+    DV137Z275 = DV137*Z275
+    C7DV137 = C7*DV137
+    # Joint 1
+    D[0, 0] = QDP1                                                    # DG1ZZ1
+    D[1, 0] = QP1                                                     # DG1FV1
+    D[2, 0] = np.sign(QP1)                                            # DG1FS1
+    D[4, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
+    D[5, 0] = S2*U312 - C2*U322                                       # DG1XY2
+    D[6, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
+    D[7, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
+    D[14, 0] = WP13*Z131 + DV133Z231 - C2*DV123                       # DG1XX3
+    D[15, 0] = U323*Z231 + C2*DW123 - U313*Z131                       # DG1XY3
+    D[16, 0] = U213*Z131 + DW313*Z231 - C2*U233                       # DG1XZ3
+    D[17, 0] = DW233*Z131 + C2*U133 - U123*Z231                       # DG1YZ3
+    D[18, 0] = DV233*Z131 + C2*WP33 - DV133Z231                       # DG1ZZ3
+    D[19, 0] = VSP23*Z231 + C2*VP23 + U113*V131 + U213*V231           # DG1MX3
+    D[20, 0] = U123*V131 + U223*V231 - VSP23*Z131 - C2*VP13           # DG1MY3
+    D[25, 0] = WP14*Z141 + DV134Z241 + DV124*Z231                     # DG1XX4
+    D[26, 0] = U324*Z241 - U314*Z141 - DW124*Z231                     # DG1XY4
+    D[27, 0] = U214*Z141 + DW314*Z241 + U234*Z231                     # DG1XZ4
+    D[28, 0] = DW234*Z141 - U124*Z241 - U134*Z231                     # DG1YZ4
+    D[29, 0] = DV234*Z141 - DV134Z241 - WP34*Z231                     # DG1ZZ4
+    D[30, 0] = VSP24*Z241 + U114*V141 + U214*V241 + U314*V341 - VP24*Z231  # DG1MX4
+    D[31, 0] = VP14*Z231 + U124*V141 + U224*V241 + U324*V341 - VSP24*Z141  # DG1MY4
+    D[36, 0] = WP15*Z151 + DV135Z251 - DV125*Z241                     # DG1XX5
+    D[37, 0] = U325*Z251 + DW125*Z241 - U315*Z151                     # DG1XY5
+    D[38, 0] = U215*Z151 + DW315*Z251 - U235*Z241                     # DG1XZ5
+    D[39, 0] = DW235*Z151 + U135*Z241 - U125*Z251                     # DG1YZ5
+    D[40, 0] = DV235*Z151 + WP35*Z241 - DV135Z251                     # DG1ZZ5
+    D[41, 0] = VP25*Z241 + U115*V151 + U215*V251 + U315*V351 - VSP25*Z251  # DG1MX5
+    D[42, 0] = VSP25*Z151 + U125*V151 + U225*V251 + U325*V351 - VP15*Z241  # DG1MY5
+    D[47, 0] = WP16*Z161 + DV136Z261 + DV126*Z251                     # DG1XX6
+    D[48, 0] = U326*Z261 - U316*Z161 - DW126*Z251                     # DG1XY6
+    D[49, 0] = U216*Z161 + DW316*Z261 + U236*Z251                     # DG1XZ6
+    D[50, 0] = DW236*Z161 - U126*Z261 - U136*Z251                     # DG1YZ6
+    D[51, 0] = DV236*Z161 - DV136Z261 - WP36*Z251                     # DG1ZZ6
+    D[52, 0] = VP25*Z261 + U116*V161 + U216*V261 - VP26*Z251 - U316*V251  # DG1MX6
+    D[53, 0] = VP16*Z251 + U126*V161 + U226*V261 - VP25*Z161 - U326*V251  # DG1MY6
+    D[58, 0] = WP17*Z171 + DV137Z271 + DV127*Z261                     # DG1XX7
+    D[59, 0] = U327*Z271 - U317*Z171 - DW127*Z261                     # DG1XY7
+    D[60, 0] = U217*Z171 + DW317*Z271 + U237*Z261                     # DG1XZ7
+    D[61, 0] = DW237*Z171 - U127*Z271 - U137*Z261                     # DG1YZ7
+    D[62, 0] = DV237*Z171 - DV137Z271 - WP37*Z261                     # DG1ZZ7
+    D[63, 0] = VSP27*Z271 + U117*V171 + U217*V271 + U317*V371 - VP27*Z261  # DG1MX7
+    D[64, 0] = VP17*Z261 + U127*V171 + U227*V271 + U327*V371 - VSP27*Z171  # DG1MY7
+    # Joint 2
+    D[4, 1] = -DV122                                                  # DG2XX2
+    D[5, 1] = DW122                                                   # DG2XY2
+    D[6, 1] = -U232                                                   # DG2XZ2
+    D[7, 1] = U132                                                    # DG2YZ2
+    D[8, 1] = QDP2                                                    # DG2ZZ2
+    D[9, 1] = VP22                                                    # DG2MX2
+    D[10, 1] = -VP12                                                  # DG2MY2
+    D[11, 1] = QP2                                                    # DG2FV2
+    D[12, 1] = np.sign(QP2)                                           # DG2FS2
+    D[14, 1] = S3*WP13 + C3DV133                                      # DG2XX3
+    D[15, 1] = C3*U323 - S3*U313                                      # DG2XY3
+    D[16, 1] = S3*U213 + C3*DW313                                     # DG2XZ3
+    D[17, 1] = S3*DW233 - C3*U123                                     # DG2YZ3
+    D[18, 1] = S3*DV233 - C3DV133                                     # DG2ZZ3
+    D[19, 1] = C3*VSP23 + U113*V132 + U213*V232                       # DG2MX3
+    D[20, 1] = U123*V132 + U223*V232 - S3*VSP23                       # DG2MY3
+    D[25, 1] = WP14*Z142 + DV134Z242 + C3*DV124                       # DG2XX4
+    D[26, 1] = U324*Z242 - U314*Z142 - C3*DW124                       # DG2XY4
+    D[27, 1] = U214*Z142 + DW314*Z242 + C3*U234                       # DG2XZ4
+    D[28, 1] = DW234*Z142 - U124*Z242 - C3*U134                       # DG2YZ4
+    D[29, 1] = DV234*Z142 - DV134Z242 - C3*WP34                       # DG2ZZ4
+    D[30, 1] = VSP24*Z242 + U114*V142 + U214*V242 - C3*VP24 - U314*V232  # DG2MX4
+    D[31, 1] = C3*VP14 + U124*V142 + U224*V242 - VSP24*Z142 - U324*V232  # DG2MY4
+    D[36, 1] = WP15*Z152 + DV135Z252 - DV125*Z242                     # DG2XX5
+    D[37, 1] = U325*Z252 + DW125*Z242 - U315*Z152                     # DG2XY5
+    D[38, 1] = U215*Z152 + DW315*Z252 - U235*Z242                     # DG2XZ5
+    D[39, 1] = DW235*Z152 + U135*Z242 - U125*Z252                     # DG2YZ5
+    D[40, 1] = DV235*Z152 + WP35*Z242 - DV135Z252                     # DG2ZZ5
+    D[41, 1] = VP25*Z242 + U115*V152 + U215*V252 + U315*V352 - VSP25*Z252  # DG2MX5
+    D[42, 1] = VSP25*Z152 + U125*V152 + U225*V252 + U325*V352 - VP15*Z242  # DG2MY5
+    D[47, 1] = WP16*Z162 + DV136Z262 + DV126*Z252                     # DG2XX6
+    D[48, 1] = U326*Z262 - U316*Z162 - DW126*Z252                     # DG2XY6
+    D[49, 1] = U216*Z162 + DW316*Z262 + U236*Z252                     # DG2XZ6
+    D[50, 1] = DW236*Z162 - U126*Z262 - U136*Z252                     # DG2YZ6
+    D[51, 1] = DV236*Z162 - DV136Z262 - WP36*Z252                     # DG2ZZ6
+    D[52, 1] = VP25*Z262 + U116*V162 + U216*V262 - VP26*Z252 - U316*V252  # DG2MX6
+    D[53, 1] = VP16*Z252 + U126*V162 + U226*V262 - VP25*Z162 - U326*V252  # DG2MY6
+    D[58, 1] = WP17*Z172 + DV137Z272 + DV127*Z262                     # DG2XX7
+    D[59, 1] = U327*Z272 - U317*Z172 - DW127*Z262                     # DG2XY7
+    D[60, 1] = U217*Z172 + DW317*Z272 + U237*Z262                     # DG2XZ7
+    D[61, 1] = DW237*Z172 - U127*Z272 - U137*Z262                     # DG2YZ7
+    D[62, 1] = DV237*Z172 - DV137Z272 - WP37*Z262                     # DG2ZZ7
+    D[63, 1] = VSP27*Z272 + U117*V172 + U217*V272 + U317*V372 - VP27*Z262  # DG2MX7
+    D[64, 1] = VP17*Z262 + U127*V172 + U227*V272 + U327*V372 - VSP27*Z172  # DG2MY7
+    # Joint 3
+    D[14, 2] = -DV123                                                 # DG3XX3
+    D[15, 2] = DW123                                                  # DG3XY3
+    D[16, 2] = -U233                                                  # DG3XZ3
+    D[17, 2] = U133                                                   # DG3YZ3
+    D[18, 2] = WP33                                                   # DG3ZZ3
+    D[19, 2] = VP23                                                   # DG3MX3
+    D[20, 2] = -VP13                                                  # DG3MY3
+    D[21, 2] = QDP3                                                   # DG3Ia3
+    D[22, 2] = QP3                                                    # DG3FV3
+    D[23, 2] = np.sign(QP3)                                           # DG3FS3
+    D[25, 2] = S4*WP14 + C4DV134                                      # DG3XX4
+    D[26, 2] = C4*U324 - S4*U314                                      # DG3XY4
+    D[27, 2] = S4*U214 + C4*DW314                                     # DG3XZ4
+    D[28, 2] = S4*DW234 - C4*U124                                     # DG3YZ4
+    D[29, 2] = S4*DV234 - C4DV134                                     # DG3ZZ4
+    D[30, 2] = DF3MX4 + C4*VSP24                                      # DG3MX4
+    D[31, 2] = -S4*VSP24 - D4*U324                                    # DG3MY4
+    D[36, 2] = WP15*Z153 + DV135Z253 - C4*DV125                       # DG3XX5
+    D[37, 2] = U325*Z253 + C4*DW125 - U315*Z153                       # DG3XY5
+    D[38, 2] = U215*Z153 + DW315*Z253 - C4*U235                       # DG3XZ5
+    D[39, 2] = DW235*Z153 + C4*U135 - U125*Z253                       # DG3YZ5
+    D[40, 2] = DV235*Z153 + C4*WP35 - DV135Z253                       # DG3ZZ5
+    D[41, 2] = C4*VP25 + U115*V153 + U215*V253 - VSP25*Z253           # DG3MX5
+    D[42, 2] = VSP25*Z153 + U125*V153 + U225*V253 - C4*VP15           # DG3MY5
+    D[47, 2] = WP16*Z163 + DV136Z263 + DV126*Z253                     # DG3XX6
+    D[48, 2] = U326*Z263 - U316*Z163 - DW126*Z253                     # DG3XY6
+    D[49, 2] = U216*Z163 + DW316*Z263 + U236*Z253                     # DG3XZ6
+    D[50, 2] = DW236*Z163 - U126*Z263 - U136*Z253                     # DG3YZ6
+    D[51, 2] = DV236*Z163 - DV136Z263 - WP36*Z253                     # DG3ZZ6
+    D[52, 2] = VP25*Z263 + U116*V163 + U216*V263 - VP26*Z253 - U316*V253  # DG3MX6
+    D[53, 2] = VP16*Z253 + U126*V163 + U226*V263 - VP25*Z163 - U326*V253  # DG3MY6
+    D[58, 2] = WP17*Z173 + DV137Z273 + DV127*Z263                     # DG3XX7
+    D[59, 2] = U327*Z273 - U317*Z173 - DW127*Z263                     # DG3XY7
+    D[60, 2] = U217*Z173 + DW317*Z273 + U237*Z263                     # DG3XZ7
+    D[61, 2] = DW237*Z173 - U127*Z273 - U137*Z263                     # DG3YZ7
+    D[62, 2] = DV237*Z173 - DV137Z273 - WP37*Z263                     # DG3ZZ7
+    D[63, 2] = VSP27*Z273 + U117*V173 + U217*V273 + U317*V373 - VP27*Z263  # DG3MX7
+    D[64, 2] = VP17*Z263 + U127*V173 + U227*V273 + U327*V373 - VSP27*Z173  # DG3MY7
+    # Joint 4
+    D[25, 3] = -DV124                                                 # DG4XX4
+    D[26, 3] = DW124                                                  # DG4XY4
+    D[27, 3] = -U234                                                  # DG4XZ4
+    D[28, 3] = U134                                                   # DG4YZ4
+    D[29, 3] = WP34                                                   # DG4ZZ4
+    D[30, 3] = VP24                                                   # DG4MX4
+    D[31, 3] = -VP14                                                  # DG4MY4
+    D[32, 3] = QDP4                                                   # DG4Ia4
+    D[33, 3] = QP4                                                    # DG4FV4
+    D[34, 3] = np.sign(QP4)                                           # DG4FS4
+    D[36, 3] = -S5*WP15 - C5DV135                                     # DG4XX5
+    D[37, 3] = S5*U315 - C5*U325                                      # DG4XY5
+    D[38, 3] = -S5*U215 - C5*DW315                                    # DG4XZ5
+    D[39, 3] = C5*U125 - S5*DW235                                     # DG4YZ5
+    D[40, 3] = C5DV135 - S5*DV235                                     # DG4ZZ5
+    D[41, 3] = C5*VSP25 + U115*V154 + U215*V254 - D4*U315             # DG4MX5
+    D[42, 3] = U125*V154 + U225*V254 - S5*VSP25 - D4*U325             # DG4MY5
+    D[47, 3] = WP16*Z164 + DV136Z264 - C5*DV126                       # DG4XX6
+    D[48, 3] = U326*Z264 + C5*DW126 - U316*Z164                       # DG4XY6
+    D[49, 3] = U216*Z164 + DW316*Z264 - C5*U236                       # DG4XZ6
+    D[50, 3] = DW236*Z164 + C5*U136 - U126*Z264                       # DG4YZ6
+    D[51, 3] = DV236*Z164 + C5*WP36 - DV136Z264                       # DG4ZZ6
+    D[52, 3] = VP25*Z264 + C5*VP26 + U116*V164 + U216*V264 - U316*V254  # DG4MX6
+    D[53, 3] = U126*V164 + U226*V264 - VP25*Z164 - C5*VP16 - U326*V254  # DG4MY6
+    D[58, 3] = WP17*Z174 + DV137Z274 + DV127*Z264                     # DG4XX7
+    D[59, 3] = U327*Z274 - U317*Z174 - DW127*Z264                     # DG4XY7
+    D[60, 3] = U217*Z174 + DW317*Z274 + U237*Z264                     # DG4XZ7
+    D[61, 3] = DW237*Z174 - U127*Z274 - U137*Z264                     # DG4YZ7
+    D[62, 3] = DV237*Z174 - DV137Z274 - WP37*Z264                     # DG4ZZ7
+    D[63, 3] = VSP27*Z274 + U117*V174 + U217*V274 + U317*V374 - VP27*Z264  # DG4MX7
+    D[64, 3] = VP17*Z264 + U127*V174 + U227*V274 + U327*V374 - VSP27*Z174  # DG4MY7
+    # Joint 5
+    D[36, 4] = -DV125                                        # DG5XX5
+    D[37, 4] = DW125                                         # DG5XY5
+    D[38, 4] = -U235                                         # DG5XZ5
+    D[39, 4] = U135                                          # DG5YZ5
+    D[40, 4] = WP35                                          # DG5ZZ5
+    D[41, 4] = VP25                                          # DG5MX5
+    D[42, 4] = -VP15                                         # DG5MY5
+    D[43, 4] = QDP5                                          # DG5Ia5
+    D[44, 4] = QP5                                           # DG5FV5
+    D[45, 4] = np.sign(QP5)                                  # DG5FS5
+    D[47, 4] = S6*WP16 + C6DV136                             # DG5XX6
+    D[48, 4] = C6*U326 - S6*U316                             # DG5XY6
+    D[49, 4] = S6*U216 + C6*DW316                            # DG5XZ6
+    D[50, 4] = S6*DW236 - C6*U126                            # DG5YZ6
+    D[51, 4] = S6*DV236 - C6DV136                            # DG5ZZ6
+    D[52, 4] = C6*VP25                                       # DG5MX6
+    D[53, 4] = -S6*VP25                                      # DG5MY6
+    D[58, 4] = WP17*Z175 + DV137Z275 + C6*DV127              # DG5XX7
+    D[59, 4] = U327*Z275 - U317*Z175 - C6*DW127              # DG5XY7
+    D[60, 4] = U217*Z175 + DW317*Z275 + C6*U237              # DG5XZ7
+    D[61, 4] = DW237*Z175 - U127*Z275 - C6*U137              # DG5YZ7
+    D[62, 4] = DV237*Z175 - DV137Z275 - C6*WP37              # DG5ZZ7
+    D[63, 4] = VSP27*Z275 + U117*V175 + U217*V275 - C6*VP27  # DG5MX7
+    D[64, 4] = C6*VP17 + U127*V175 + U227*V275 - VSP27*Z175  # DG5MY7
+    # Joint 6
+    D[47, 5] = -DV126               # DG6XX6
+    D[48, 5] = DW126                # DG6XY6
+    D[49, 5] = -U236                # DG6XZ6
+    D[50, 5] = U136                 # DG6YZ6
+    D[51, 5] = WP36                 # DG6ZZ6
+    D[52, 5] = VP26                 # DG6MX6
+    D[53, 5] = -VP16                # DG6MY6
+    D[54, 5] = QDP6                 # DG6Ia6
+    D[55, 5] = QP6                  # DG6FV6
+    D[56, 5] = np.sign(QP6)         # DG6FS6
+    D[58, 5] = S7*WP17 + C7DV137    # DG6XX7
+    D[59, 5] = C7*U327 - S7*U317    # DG6XY7
+    D[60, 5] = S7*U217 + C7*DW317   # DG6XZ7
+    D[61, 5] = S7*DW237 - C7*U127   # DG6YZ7
+    D[62, 5] = S7*DV237 - C7DV137   # DG6ZZ7
+    D[63, 5] = C7*VSP27 - D7*U317   # DG6MX7
+    D[64, 5] = -S7*VSP27 - D7*U327  # DG6MY7
+    # Joint 7
+    D[58, 6] = -DV127        # DG7XX7
+    D[59, 6] = DW127         # DG7XY7
+    D[60, 6] = -U237         # DG7XZ7
+    D[61, 6] = U137          # DG7YZ7
+    D[62, 6] = WP37          # DG7ZZ7
+    D[63, 6] = VP27          # DG7MX7
+    D[64, 6] = -VP17         # DG7MY7
+    D[65, 6] = QDP7          # DG7Ia7
+    D[66, 6] = QP7           # DG7FV7
+    D[67, 6] = np.sign(QP7)  # DG7FS7
+
+
+def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL1, RL3, D4, RL5, D7, g):
+    """Fill GAM, shape (7, N). q, qd, qdd: (7, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    q7 = q[6]
+    QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
+    QDP1, QDP2, QDP3, QDP4, QDP5, QDP6, QDP7 = qdd
+    (
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2, YZ2, ZZ2R, MX2, MY2R, FV2, FS2, OFFSET2, XX3R, XY3R, XZ3, YZ3, ZZ3R,
+        MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4, YZ4, ZZ4R, MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5,
+        XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6R, XZ6, YZ6, ZZ6R, MX6R, MY6R, Ia6, FV6, FS6,
+        OFFSET6, XX7R, XY7, XZ7, YZ7, ZZ7, MX7, MY7, Ia7, FV7, FS7, OFFSET7
+    ) = X
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    DV232 = QP2*W22
+    WP12 = DV232 - S2*QDP1
+    DV132 = QP2*W12
+    WP22 = -C2*QDP1 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U122 = DV122 - QDP2
+    U132 = DV132 + WP22
+    U212 = QDP2 + DV122
+    U222 = -DV112 - DV332
+    U232 = DV232 - WP12
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 3
+    W13 = C3*W12 + S3*QP2
+    W23 = C3*QP2 - S3*W12
+    W33 = QP3 - W22
+    WP13 = C3*WP12 + S3*QDP2 + QP3*W23
+    WP23 = C3*QDP2 - S3*WP12 - QP3*W13
+    WP33 = QDP3 - WP22
+    DV113 = W13**2
+    DV123 = W13*W23
+    DV133 = W13*W33
+    DV223 = W23**2
+    DV233 = W23*W33
+    DV333 = W33**2
+    DW233 = DV223 - DV333
+    DW313 = DV333 - DV113
+    DW123 = DV113 - DV223
+    U113 = -DV223 - DV333
+    U123 = DV123 - WP33
+    U133 = WP23 + DV133
+    U213 = WP33 + DV123
+    U223 = -DV113 - DV333
+    U233 = DV233 - WP13
+    U313 = DV133 - WP23
+    U323 = WP13 + DV233
+    VSP33 = -RL3*U322
+    VSP13 = VP12 - RL3*U122
+    VSP23 = VP22 - RL3*U222
+    VP13 = C3*VSP13 + S3*VSP33
+    VP23 = C3*VSP33 - S3*VSP13
+    # Link 4
+    W14 = C4*W13 + S4*W33
+    W24 = C4*W33 - S4*W13
+    W34 = QP4 - W23
+    WP14 = C4*WP13 + S4*WP33 + QP4*W24
+    WP24 = C4*WP33 - S4*WP13 - QP4*W14
+    WP34 = QDP4 - WP23
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = DV124 - WP34
+    U134 = WP24 + DV134
+    U214 = WP34 + DV124
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VSP14 = VP13 + D4*U113
+    VSP24 = VP23 + D4*U213
+    VSP34 = D4*U313 - VSP23
+    VP14 = C4*VSP14 + S4*VSP34
+    VP24 = C4*VSP34 - S4*VSP14
+    # Link 5
+    W15 = C5*W14 - S5*W34
+    W25 = -C5*W34 - S5*W14
+    W35 = QP5 + W24
+    WP15 = C5*WP14 + QP5*W25 - S5*WP34
+    WP25 = -C5*WP34 - S5*WP14 - QP5*W15
+    WP35 = QDP5 + WP24
+    DV115 = W15**2
+    DV125 = W15*W25
+    DV135 = W15*W35
+    DV225 = W25**2
+    DV235 = W25*W35
+    DV335 = W35**2
+    DW235 = DV225 - DV335
+    DW315 = DV335 - DV115
+    DW125 = DV115 - DV225
+    U115 = -DV225 - DV335
+    U125 = DV125 - WP35
+    U135 = WP25 + DV135
+    U215 = WP35 + DV125
+    U225 = -DV115 - DV335
+    U235 = DV235 - WP15
+    U315 = DV135 - WP25
+    U325 = WP15 + DV235
+    VSP15 = VP14 + RL5*U124 - D4*U114
+    VSP25 = VP24 + RL5*U224 - D4*U214
+    VSP35 = RL5*U324 - VSP24 - D4*U314
+    VP15 = C5*VSP15 - S5*VSP35
+    VP25 = -C5*VSP35 - S5*VSP15
+    # Link 6
+    W16 = C6*W15 + S6*W35
+    W26 = C6*W35 - S6*W15
+    W36 = QP6 - W25
+    WP16 = C6*WP15 + S6*WP35 + QP6*W26
+    WP26 = C6*WP35 - S6*WP15 - QP6*W16
+    WP36 = QDP6 - WP25
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV136 = W16*W36
+    DV226 = W26**2
+    DV236 = W26*W36
+    DV336 = W36**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = DV126 - WP36
+    U136 = WP26 + DV136
+    U216 = WP36 + DV126
+    U226 = -DV116 - DV336
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = WP16 + DV236
+    VP16 = C6*VP15 + S6*VSP25
+    VP26 = C6*VSP25 - S6*VP15
+    # Link 7
+    W17 = C7*W16 + S7*W36
+    W27 = C7*W36 - S7*W16
+    W37 = QP7 - W26
+    WP17 = C7*WP16 + S7*WP36 + QP7*W27
+    WP27 = C7*WP36 - S7*WP16 - QP7*W17
+    WP37 = QDP7 - WP26
+    DV117 = W17**2
+    DV127 = W17*W27
+    DV137 = W17*W37
+    DV227 = W27**2
+    DV237 = W27*W37
+    DV337 = W37**2
+    DW237 = DV227 - DV337
+    DW317 = DV337 - DV117
+    DW127 = DV117 - DV227
+    U117 = -DV227 - DV337
+    U127 = DV127 - WP37
+    U137 = WP27 + DV137
+    U217 = WP37 + DV127
+    U227 = -DV117 - DV337
+    U237 = DV237 - WP17
+    U317 = DV137 - WP27
+    U327 = WP17 + DV237
+    VSP17 = VP16 + D7*U116
+    VSP27 = VP26 + D7*U216
+    VSP37 = D7*U316 - VP25
+    VP17 = C7*VSP17 + S7*VSP37
+    VP27 = C7*VSP37 - S7*VSP17
+    # Joint 7
+    F17 = MX7*U117 + MY7*U127
+    F27 = MX7*U217 + MY7*U227
+    F37 = MX7*U317 + MY7*U327
+    N17 = XX7R*WP17 + ZZ7*DV237 + YZ7*DW237 + XZ7*U217 - XY7*U317 - MY7*VSP27
+    N27 = (XX7R - ZZ7)*DV137 + XZ7*DW317 + XY7*U327 + MX7*VSP27 - YZ7*U127
+    N37 = ZZ7*WP37 + XY7*DW127 + YZ7*U137 + MX7*VP27 - XX7R*DV127 - XZ7*U237 - MY7*VP17
+    FDI17 = C7*F17 - S7*F27
+    FDI37 = S7*F17 + C7*F27
+    # Joint 6
+    F16 = MX6R*U116 + MY6R*U126
+    F26 = MX6R*U216 + MY6R*U226
+    F36 = MX6R*U316 + MY6R*U326
+    E16 = FDI17 + F16
+    E26 = F26 - F37
+    E36 = FDI37 + F36
+    N16 = XX6R*WP16 + ZZ6R*DV236 + YZ6*DW236 + XZ6*U216 - XY6R*U316 - MY6R*VP25
+    N26 = (XX6R - ZZ6R)*DV136 + XZ6*DW316 + XY6R*U326 + MX6R*VP25 - YZ6*U126
+    N36 = ZZ6R*WP36 + XY6R*DW126 + YZ6*U136 + MX6R*VP26 - XX6R*DV126 - XZ6*U236 - MY6R*VP16
+    NE16 = C7*N17 + N16 - S7*N27
+    NE26 = N26 - N37 - D7*FDI37
+    NE36 = S7*N17 + C7*N27 + N36 - D7*F37
+    FDI16 = C6*E16 - S6*E26
+    FDI36 = S6*E16 + C6*E26
+    # Joint 5
+    F15 = MX5*U115 + MY5R*U125
+    F25 = MX5*U215 + MY5R*U225
+    F35 = MX5*U315 + MY5R*U325
+    E15 = FDI16 + F15
+    E25 = F25 - E36
+    E35 = FDI36 + F35
+    N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VSP25 - XY5*U315
+    N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VSP25
+    N35 = ZZ5R*WP35 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
+    NE15 = C6*NE16 + N15 - S6*NE26
+    NE25 = N25 - NE36
+    NE35 = S6*NE16 + C6*NE26 + N35
+    FDI15 = C5*E15 - S5*E25
+    FDI35 = -S5*E15 - C5*E25
+    # Joint 4
+    F14 = MX4R*U114 + MY4R*U124
+    F24 = MX4R*U214 + MY4R*U224
+    F34 = MX4R*U314 + MY4R*U324
+    E14 = FDI15 + F14
+    E24 = E35 + F24
+    E34 = FDI35 + F34
+    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4R*U314 - MY4R*VSP24
+    N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4R*U324 + MX4R*VSP24 - YZ4*U124
+    N34 = ZZ4R*WP34 + XY4R*DW124 + YZ4*U134 + MX4R*VP24 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
+    NE14 = C5*NE15 + RL5*FDI35 + N14 - S5*NE25
+    NE24 = NE35 + D4*FDI35 + N24
+    NE34 = N34 - S5*NE15 - C5*NE25 - D4*E35 - RL5*FDI15
+    FDI14 = C4*E14 - S4*E24
+    FDI34 = S4*E14 + C4*E24
+    # Joint 3
+    F13 = MX3R*U113 + MY3R*U123
+    F23 = MX3R*U213 + MY3R*U223
+    E13 = FDI14 + F13
+    E23 = F23 - E34
+    N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3*DW233 + XZ3*U213 - XY3R*U313 - MY3R*VSP23
+    N23 = (XX3R - ZZ3R)*DV133 + XZ3*DW313 + XY3R*U323 + MX3R*VSP23 - YZ3*U123
+    N33 = ZZ3R*WP33 + XY3R*DW123 + YZ3*U133 + MX3R*VP23 - XX3R*DV123 - XZ3*U233 - MY3R*VP13
+    NE13 = C4*NE14 + N13 - S4*NE24
+    NE23 = N23 - NE34 - D4*FDI34
+    NE33 = S4*NE14 + C4*NE24 + N33 - D4*E34
+    FDI13 = C3*E13 - S3*E23
+    FDI33 = S3*E13 + C3*E23
+    # Joint 2
+    N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2*DW232 + XZ2*U212 - XY2*U312
+    N22 = (XX2R - ZZ2R)*DV132 + XZ2*DW312 + XY2*U322 - YZ2*U122
+    N32 = ZZ2R*QDP2 + XY2*DW122 + YZ2*U132 + MX2*VP22 - XX2R*DV122 - XZ2*U232 - MY2R*VP12
+    NE12 = C3*NE13 + N12 - S3*NE23 - RL3*FDI33
+    NE22 = N22 - NE33
+    NE32 = S3*NE13 + C3*NE23 + RL3*FDI13 + N32
+    # Joint 1
+    N31 = ZZ1R*QDP1
+    NE31 = N31 - S2*NE12 - C2*NE22
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
+    GAM[2] = OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*np.sign(QP3)
+    GAM[3] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*np.sign(QP4)
+    GAM[4] = OFFSET5 + NE35 + Ia5*QDP5 + FV5*QP5 + FS5*np.sign(QP5)
+    GAM[5] = OFFSET6 + NE36 + Ia6*QDP6 + FV6*QP6 + FS6*np.sign(QP6)
+    GAM[6] = OFFSET7 + N37 + Ia7*QDP7 + FV7*QP7 + FS7*np.sign(QP7)
+
+
+def _inertia_matrix_block(q, A, X, RL1, RL3, D4, RL5, D7, g):
+    """Fill A, shape (7, 7, N): column i is Gamma for a unit acceleration of joint i from rest. q: (7, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    q7 = q[6]
+    ZZ1R = X[0]
+    XX2R = X[4]
+    XY2 = X[5]
+    XZ2 = X[6]
+    YZ2 = X[7]
+    ZZ2R = X[8]
+    XX3R = X[14]
+    XY3R = X[15]
+    XZ3 = X[16]
+    YZ3 = X[17]
+    ZZ3R = X[18]
+    MX3R = X[19]
+    MY3R = X[20]
+    Ia3 = X[21]
+    XX4R = X[25]
+    XY4R = X[26]
+    XZ4 = X[27]
+    YZ4 = X[28]
+    ZZ4R = X[29]
+    MX4R = X[30]
+    MY4R = X[31]
+    Ia4 = X[32]
+    XX5R = X[36]
+    XY5 = X[37]
+    XZ5 = X[38]
+    YZ5 = X[39]
+    ZZ5R = X[40]
+    MX5 = X[41]
+    MY5R = X[42]
+    Ia5 = X[43]
+    XX6R = X[47]
+    XY6R = X[48]
+    XZ6 = X[49]
+    YZ6 = X[50]
+    ZZ6R = X[51]
+    MX6R = X[52]
+    MY6R = X[53]
+    Ia6 = X[54]
+    XX7R = X[58]
+    XY7 = X[59]
+    XZ7 = X[60]
+    YZ7 = X[61]
+    ZZ7 = X[62]
+    MX7 = X[63]
+    MY7 = X[64]
+    Ia7 = X[65]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    # Link 3
+    WP131 = -S2*C3
+    WP231 = S2*S3
+    VSP331 = RL3*S2
+    VP131 = S3*VSP331
+    VP231 = C3*VSP331
+    # Link 4
+    WP141 = C4*WP131 + C2*S4
+    WP241 = C2*C4 - S4*WP131
+    VSP341 = -D4*WP231
+    VSP241 = VP231 + D4*C2
+    VP141 = C4*VP131 + S4*VSP341
+    VP241 = C4*VSP341 - S4*VP131
+    # Link 5
+    WP151 = C5*WP141 + S5*WP231
+    WP251 = C5*WP231 - S5*WP141
+    VSP151 = VP141 + RL5*WP231
+    VSP251 = VP241 - VSP341
+    VSP351 = D4*WP241 + RL5*WP141 - VSP241
+    VP151 = C5*VSP151 - S5*VSP351
+    VP251 = -C5*VSP351 - S5*VSP151
+    # Link 6
+    WP161 = C6*WP151 + S6*WP241
+    WP261 = C6*WP241 - S6*WP151
+    VP161 = C6*VP151 + S6*VSP251
+    VP261 = C6*VSP251 - S6*VP151
+    # Link 7
+    WP171 = C7*WP161 - S7*WP251
+    WP271 = -C7*WP251 - S7*WP161
+    VSP271 = VP261 - D7*WP251
+    VSP371 = -VP251 - D7*WP261
+    VP171 = C7*VP161 + S7*VSP371
+    VP271 = C7*VSP371 - S7*VP161
+    # Joint 7
+    F171 = MY7*WP261
+    F271 = -MX7*WP261
+    F371 = MY7*WP171 - MX7*WP271
+    N171 = XX7R*WP171 + XY7*WP271 - XZ7*WP261 - MY7*VSP271
+    N271 = XY7*WP171 + MX7*VSP271 - YZ7*WP261
+    N371 = YZ7*WP271 + XZ7*WP171 + MX7*VP271 - ZZ7*WP261 - MY7*VP171
+    FDI171 = C7*F171 - S7*F271
+    FDI371 = S7*F171 + C7*F271
+    # Joint 6
+    F161 = MY6R*WP251
+    F261 = -MX6R*WP251
+    F361 = MY6R*WP161 - MX6R*WP261
+    E161 = FDI171 + F161
+    E261 = F261 - F371
+    E361 = FDI371 + F361
+    N161 = XX6R*WP161 + XY6R*WP261 - XZ6*WP251 - MY6R*VP251
+    N261 = XY6R*WP161 + MX6R*VP251 - YZ6*WP251
+    N361 = YZ6*WP261 + XZ6*WP161 + MX6R*VP261 - ZZ6R*WP251 - MY6R*VP161
+    NE161 = C7*N171 + N161 - S7*N271
+    NE261 = N261 - N371 - D7*FDI371
+    NE361 = S7*N171 + C7*N271 + N361 - D7*F371
+    FDI161 = C6*E161 - S6*E261
+    FDI361 = S6*E161 + C6*E261
+    # Joint 5
+    F151 = -MY5R*WP241
+    F251 = MX5*WP241
+    F351 = MY5R*WP151 - MX5*WP251
+    E151 = FDI161 + F151
+    E251 = F251 - E361
+    E351 = FDI361 + F351
+    N151 = XX5R*WP151 + XZ5*WP241 + XY5*WP251 + MY5R*VSP251
+    N251 = XY5*WP151 + YZ5*WP241 - MX5*VSP251
+    N351 = ZZ5R*WP241 + YZ5*WP251 + XZ5*WP151 + MX5*VP251 - MY5R*VP151
+    NE151 = C6*NE161 + N151 - S6*NE261
+    NE251 = N251 - NE361
+    NE351 = S6*NE161 + C6*NE261 + N351
+    FDI151 = C5*E151 - S5*E251
+    FDI351 = -S5*E151 - C5*E251
+    # Joint 4
+    F141 = MY4R*WP231
+    F241 = -MX4R*WP231
+    F341 = MY4R*WP141 - MX4R*WP241
+    E141 = FDI151 + F141
+    E241 = E351 + F241
+    E341 = FDI351 + F341
+    N141 = XX4R*WP141 + XY4R*WP241 - XZ4*WP231 - MY4R*VSP241
+    N241 = XY4R*WP141 + MX4R*VSP241 - YZ4*WP231
+    N341 = YZ4*WP241 + XZ4*WP141 + MX4R*VP241 - ZZ4R*WP231 - MY4R*VP141
+    NE141 = C5*NE151 + RL5*FDI351 + N141 - S5*NE251
+    NE241 = NE351 + D4*FDI351 + N241
+    NE341 = N341 - S5*NE151 - C5*NE251 - D4*E351 - RL5*FDI151
+    FDI141 = C4*E141 - S4*E241
+    FDI341 = S4*E141 + C4*E241
+    # Joint 3
+    F131 = -MY3R*C2
+    F231 = MX3R*C2
+    E131 = FDI141 + F131
+    E231 = F231 - E341
+    N131 = XX3R*WP131 + XZ3*C2 + XY3R*WP231
+    N231 = XY3R*WP131 + YZ3*C2
+    N331 = ZZ3R*C2 + YZ3*WP231 + XZ3*WP131 + MX3R*VP231 - MY3R*VP131
+    NE131 = C4*NE141 + N131 - S4*NE241
+    NE231 = N231 - NE341 - D4*FDI341
+    NE331 = S4*NE141 + C4*NE241 + N331 - D4*E341
+    FDI131 = C3*E131 - S3*E231
+    FDI331 = S3*E131 + C3*E231
+    # Joint 2
+    N121 = -XX2R*S2 - XY2*C2
+    N221 = -XY2*S2
+    N321 = -YZ2*C2 - XZ2*S2
+    NE121 = C3*NE131 + N121 - S3*NE231 - RL3*FDI331
+    NE221 = N221 - NE331
+    NE321 = S3*NE131 + C3*NE231 + RL3*FDI131 + N321
+    # Joint 1
+    NE311 = ZZ1R - S2*NE121 - C2*NE221
+    # Link 3
+    VP132 = RL3*C3
+    VP232 = -RL3*S3
+    # Link 4
+    WP142 = S3*C4
+    WP242 = -S3*S4
+    VSP342 = -D4*C3
+    VP142 = C4*VP132 + S4*VSP342
+    VP242 = C4*VSP342 - S4*VP132
+    # Link 5
+    WP152 = C5*WP142 + C3*S5
+    WP252 = C3*C5 - S5*WP142
+    VSP152 = VP142 + RL5*C3
+    VSP252 = VP242 - VSP342
+    VSP352 = D4*WP242 + RL5*WP142 - VP232
+    VP152 = C5*VSP152 - S5*VSP352
+    VP252 = -C5*VSP352 - S5*VSP152
+    # Link 6
+    WP162 = C6*WP152 + S6*WP242
+    WP262 = C6*WP242 - S6*WP152
+    VP162 = C6*VP152 + S6*VSP252
+    VP262 = C6*VSP252 - S6*VP152
+    # Link 7
+    WP172 = C7*WP162 - S7*WP252
+    WP272 = -C7*WP252 - S7*WP162
+    VSP272 = VP262 - D7*WP252
+    VSP372 = -VP252 - D7*WP262
+    VP172 = C7*VP162 + S7*VSP372
+    VP272 = C7*VSP372 - S7*VP162
+    # Joint 7
+    F172 = MY7*WP262
+    F272 = -MX7*WP262
+    F372 = MY7*WP172 - MX7*WP272
+    N172 = XX7R*WP172 + XY7*WP272 - XZ7*WP262 - MY7*VSP272
+    N272 = XY7*WP172 + MX7*VSP272 - YZ7*WP262
+    N372 = YZ7*WP272 + XZ7*WP172 + MX7*VP272 - ZZ7*WP262 - MY7*VP172
+    FDI172 = C7*F172 - S7*F272
+    FDI372 = S7*F172 + C7*F272
+    # Joint 6
+    F162 = MY6R*WP252
+    F262 = -MX6R*WP252
+    F362 = MY6R*WP162 - MX6R*WP262
+    E162 = FDI172 + F162
+    E262 = F262 - F372
+    E362 = FDI372 + F362
+    N162 = XX6R*WP162 + XY6R*WP262 - XZ6*WP252 - MY6R*VP252
+    N262 = XY6R*WP162 + MX6R*VP252 - YZ6*WP252
+    N362 = YZ6*WP262 + XZ6*WP162 + MX6R*VP262 - ZZ6R*WP252 - MY6R*VP162
+    NE162 = C7*N172 + N162 - S7*N272
+    NE262 = N262 - N372 - D7*FDI372
+    NE362 = S7*N172 + C7*N272 + N362 - D7*F372
+    FDI162 = C6*E162 - S6*E262
+    FDI362 = S6*E162 + C6*E262
+    # Joint 5
+    F152 = -MY5R*WP242
+    F252 = MX5*WP242
+    F352 = MY5R*WP152 - MX5*WP252
+    E152 = FDI162 + F152
+    E252 = F252 - E362
+    E352 = FDI362 + F352
+    N152 = XX5R*WP152 + XZ5*WP242 + XY5*WP252 + MY5R*VSP252
+    N252 = XY5*WP152 + YZ5*WP242 - MX5*VSP252
+    N352 = ZZ5R*WP242 + YZ5*WP252 + XZ5*WP152 + MX5*VP252 - MY5R*VP152
+    NE152 = C6*NE162 + N152 - S6*NE262
+    NE252 = N252 - NE362
+    NE352 = S6*NE162 + C6*NE262 + N352
+    FDI152 = C5*E152 - S5*E252
+    FDI352 = -S5*E152 - C5*E252
+    # Joint 4
+    F142 = MY4R*C3
+    F242 = -MX4R*C3
+    F342 = MY4R*WP142 - MX4R*WP242
+    E142 = FDI152 + F142
+    E242 = E352 + F242
+    E342 = FDI352 + F342
+    N142 = XX4R*WP142 + XY4R*WP242 - XZ4*C3 - MY4R*VP232
+    N242 = XY4R*WP142 + MX4R*VP232 - YZ4*C3
+    N342 = YZ4*WP242 + XZ4*WP142 + MX4R*VP242 - ZZ4R*C3 - MY4R*VP142
+    NE142 = C5*NE152 + RL5*FDI352 + N142 - S5*NE252
+    NE242 = NE352 + D4*FDI352 + N242
+    NE342 = N342 - S5*NE152 - C5*NE252 - D4*E352 - RL5*FDI152
+    FDI142 = C4*E142 - S4*E242
+    FDI342 = S4*E142 + C4*E242
+    # Joint 3
+    N132 = XX3R*S3 + XY3R*C3
+    N232 = XY3R*S3
+    N332 = YZ3*C3 + XZ3*S3 + MX3R*VP232 - MY3R*VP132
+    NE132 = C4*NE142 + N132 - S4*NE242
+    NE232 = N232 - NE342 - D4*FDI342
+    NE332 = S4*NE142 + C4*NE242 + N332 - D4*E342
+    FDI132 = C3*FDI142 + S3*E342
+    # Joint 2
+    NE322 = ZZ2R + S3*NE132 + C3*NE232 + RL3*FDI132
+    # Link 5
+    WP153 = S4*C5
+    WP253 = -S4*S5
+    VSP353 = D4*C4 + RL5*S4 - D4
+    VP153 = -S5*VSP353
+    VP253 = -C5*VSP353
+    # Link 6
+    WP163 = C6*WP153 + C4*S6
+    WP263 = C4*C6 - S6*WP153
+    VP163 = C6*VP153
+    VP263 = -S6*VP153
+    # Link 7
+    WP173 = C7*WP163 - S7*WP253
+    WP273 = -C7*WP253 - S7*WP163
+    VSP273 = VP263 - D7*WP253
+    VSP373 = -VP253 - D7*WP263
+    VP173 = C7*VP163 + S7*VSP373
+    VP273 = C7*VSP373 - S7*VP163
+    # Joint 7
+    F173 = MY7*WP263
+    F273 = -MX7*WP263
+    F373 = MY7*WP173 - MX7*WP273
+    N173 = XX7R*WP173 + XY7*WP273 - XZ7*WP263 - MY7*VSP273
+    N273 = XY7*WP173 + MX7*VSP273 - YZ7*WP263
+    N373 = YZ7*WP273 + XZ7*WP173 + MX7*VP273 - ZZ7*WP263 - MY7*VP173
+    FDI173 = C7*F173 - S7*F273
+    FDI373 = S7*F173 + C7*F273
+    # Joint 6
+    F163 = MY6R*WP253
+    F263 = -MX6R*WP253
+    F363 = MY6R*WP163 - MX6R*WP263
+    E163 = FDI173 + F163
+    E263 = F263 - F373
+    E363 = FDI373 + F363
+    N163 = XX6R*WP163 + XY6R*WP263 - XZ6*WP253 - MY6R*VP253
+    N263 = XY6R*WP163 + MX6R*VP253 - YZ6*WP253
+    N363 = YZ6*WP263 + XZ6*WP163 + MX6R*VP263 - ZZ6R*WP253 - MY6R*VP163
+    NE163 = C7*N173 + N163 - S7*N273
+    NE263 = N263 - N373 - D7*FDI373
+    NE363 = S7*N173 + C7*N273 + N363 - D7*F373
+    FDI163 = C6*E163 - S6*E263
+    FDI363 = S6*E163 + C6*E263
+    # Joint 5
+    F153 = -MY5R*C4
+    F253 = MX5*C4
+    F353 = MY5R*WP153 - MX5*WP253
+    E153 = FDI163 + F153
+    E253 = F253 - E363
+    E353 = FDI363 + F353
+    N153 = XX5R*WP153 + XZ5*C4 + XY5*WP253
+    N253 = XY5*WP153 + YZ5*C4
+    N353 = ZZ5R*C4 + YZ5*WP253 + XZ5*WP153 + MX5*VP253 - MY5R*VP153
+    NE153 = C6*NE163 + N153 - S6*NE263
+    NE253 = N253 - NE363
+    NE353 = S6*NE163 + C6*NE263 + N353
+    FDI153 = C5*E153 - S5*E253
+    FDI353 = -S5*E153 - C5*E253
+    # Joint 4
+    F343 = MY4R*S4 - MX4R*C4
+    E343 = FDI353 + F343
+    N343 = YZ4*C4 + XZ4*S4
+    N143 = XX4R*S4 + XY4R*C4 - MY4R*D4
+    N243 = XY4R*S4 + MX4R*D4
+    NE143 = C5*NE153 + RL5*FDI353 + N143 - S5*NE253
+    NE243 = NE353 + D4*FDI353 + N243
+    NE343 = N343 - S5*NE153 - C5*NE253 - D4*E353 - RL5*FDI153
+    # Joint 3
+    NE333 = ZZ3R + S4*NE143 + C4*NE243 - D4*E343
+    # Link 5
+    VP154 = -RL5*C5
+    VP254 = RL5*S5
+    # Link 6
+    WP164 = -S5*C6
+    WP264 = S5*S6
+    VP164 = C6*VP154 - D4*S6
+    VP264 = -D4*C6 - S6*VP154
+    # Link 7
+    WP174 = C7*WP164 + C5*S7
+    WP274 = C5*C7 - S7*WP164
+    VSP274 = VP264 + D7*C5
+    VSP374 = -VP254 - D7*WP264
+    VP174 = C7*VP164 + S7*VSP374
+    VP274 = C7*VSP374 - S7*VP164
+    # Joint 7
+    F174 = MY7*WP264
+    F274 = -MX7*WP264
+    F374 = MY7*WP174 - MX7*WP274
+    N174 = XX7R*WP174 + XY7*WP274 - XZ7*WP264 - MY7*VSP274
+    N274 = XY7*WP174 + MX7*VSP274 - YZ7*WP264
+    N374 = YZ7*WP274 + XZ7*WP174 + MX7*VP274 - ZZ7*WP264 - MY7*VP174
+    FDI174 = C7*F174 - S7*F274
+    FDI374 = S7*F174 + C7*F274
+    # Joint 6
+    F164 = -MY6R*C5
+    F264 = MX6R*C5
+    F364 = MY6R*WP164 - MX6R*WP264
+    E164 = FDI174 + F164
+    E264 = F264 - F374
+    E364 = FDI374 + F364
+    N164 = XX6R*WP164 + XZ6*C5 + XY6R*WP264 - MY6R*VP254
+    N264 = XY6R*WP164 + YZ6*C5 + MX6R*VP254
+    N364 = ZZ6R*C5 + YZ6*WP264 + XZ6*WP164 + MX6R*VP264 - MY6R*VP164
+    NE164 = C7*N174 + N164 - S7*N274
+    NE264 = N264 - N374 - D7*FDI374
+    NE364 = S7*N174 + C7*N274 + N364 - D7*F374
+    FDI164 = C6*E164 - S6*E264
+    FDI364 = S6*E164 + C6*E264
+    # Joint 5
+    F354 = MX5*C5 - MY5R*S5
+    E354 = FDI364 + F354
+    N154 = -XX5R*S5 - XY5*C5 - MY5R*D4
+    N254 = MX5*D4 - XY5*S5
+    N354 = MX5*VP254 - YZ5*C5 - XZ5*S5 - MY5R*VP154
+    NE154 = C6*NE164 + N154 - S6*NE264
+    NE254 = N254 - NE364
+    NE354 = S6*NE164 + C6*NE264 + N354
+    FDI154 = C5*FDI164 + S5*E364
+    # Joint 4
+    NE344 = ZZ4R - S5*NE154 - C5*NE254 - D4*E354 - RL5*FDI154
+    # Link 7
+    WP175 = S6*C7
+    WP275 = -S6*S7
+    VSP375 = -D7*C6
+    VP175 = S7*VSP375
+    VP275 = C7*VSP375
+    # Joint 7
+    F175 = MY7*C6
+    F275 = -MX7*C6
+    F375 = MY7*WP175 - MX7*WP275
+    N175 = XX7R*WP175 + XY7*WP275 - XZ7*C6
+    N275 = XY7*WP175 - YZ7*C6
+    N375 = YZ7*WP275 + XZ7*WP175 + MX7*VP275 - ZZ7*C6 - MY7*VP175
+    FDI375 = S7*F175 + C7*F275
+    # Joint 6
+    N165 = XX6R*S6 + XY6R*C6
+    N265 = XY6R*S6
+    N365 = YZ6*C6 + XZ6*S6
+    NE165 = C7*N175 + N165 - S7*N275
+    NE265 = N265 - N375 - D7*FDI375
+    NE365 = S7*N175 + C7*N275 + N365 - D7*F375
+    # Joint 5
+    NE355 = ZZ5R + S6*NE165 + C6*NE265
+    # Joint 7
+    F376 = MY7*S7 - MX7*C7
+    N376 = YZ7*C7 + XZ7*S7
+    N176 = XX7R*S7 + XY7*C7 - MY7*D7
+    N276 = XY7*S7 + MX7*D7
+    # Joint 6
+    NE366 = ZZ6R + S7*N176 + C7*N276 - D7*F376
+    # Inertia matrix
+    A[0, 0] = NE311
+    A[1, 0] = A[0, 1] = NE321
+    A[2, 0] = A[0, 2] = NE331
+    A[3, 0] = A[0, 3] = NE341
+    A[4, 0] = A[0, 4] = NE351
+    A[5, 0] = A[0, 5] = NE361
+    A[6, 0] = A[0, 6] = N371
+    A[1, 1] = NE322
+    A[2, 1] = A[1, 2] = NE332
+    A[3, 1] = A[1, 3] = NE342
+    A[4, 1] = A[1, 4] = NE352
+    A[5, 1] = A[1, 5] = NE362
+    A[6, 1] = A[1, 6] = N372
+    A[2, 2] = Ia3 + NE333
+    A[3, 2] = A[2, 3] = NE343
+    A[4, 2] = A[2, 4] = NE353
+    A[5, 2] = A[2, 5] = NE363
+    A[6, 2] = A[2, 6] = N373
+    A[3, 3] = Ia4 + NE344
+    A[4, 3] = A[3, 4] = NE354
+    A[5, 3] = A[3, 5] = NE364
+    A[6, 3] = A[3, 6] = N374
+    A[4, 4] = Ia5 + NE355
+    A[5, 4] = A[4, 5] = NE365
+    A[6, 4] = A[4, 6] = N375
+    A[5, 5] = Ia6 + NE366
+    A[6, 5] = A[5, 6] = N376
+    A[6, 6] = ZZ7 + Ia7
+
+
+def _bias_block(q, qd, GAM, X, RL1, RL3, D4, RL5, D7, g):
+    """Fill GAM, shape (7, N), for qdd = 0. q, qd: (7, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    q7 = q[6]
+    QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
+    FV1 = X[1]
+    FS1 = X[2]
+    OFFSET1 = X[3]
+    XX2R = X[4]
+    XY2 = X[5]
+    XZ2 = X[6]
+    YZ2 = X[7]
+    ZZ2R = X[8]
+    MX2 = X[9]
+    MY2R = X[10]
+    FV2 = X[11]
+    FS2 = X[12]
+    OFFSET2 = X[13]
+    XX3R = X[14]
+    XY3R = X[15]
+    XZ3 = X[16]
+    YZ3 = X[17]
+    ZZ3R = X[18]
+    MX3R = X[19]
+    MY3R = X[20]
+    FV3 = X[22]
+    FS3 = X[23]
+    OFFSET3 = X[24]
+    XX4R = X[25]
+    XY4R = X[26]
+    XZ4 = X[27]
+    YZ4 = X[28]
+    ZZ4R = X[29]
+    MX4R = X[30]
+    MY4R = X[31]
+    FV4 = X[33]
+    FS4 = X[34]
+    OFFSET4 = X[35]
+    XX5R = X[36]
+    XY5 = X[37]
+    XZ5 = X[38]
+    YZ5 = X[39]
+    ZZ5R = X[40]
+    MX5 = X[41]
+    MY5R = X[42]
+    FV5 = X[44]
+    FS5 = X[45]
+    OFFSET5 = X[46]
+    XX6R = X[47]
+    XY6R = X[48]
+    XZ6 = X[49]
+    YZ6 = X[50]
+    ZZ6R = X[51]
+    MX6R = X[52]
+    MY6R = X[53]
+    FV6 = X[55]
+    FS6 = X[56]
+    OFFSET6 = X[57]
+    XX7R = X[58]
+    XY7 = X[59]
+    XZ7 = X[60]
+    YZ7 = X[61]
+    ZZ7 = X[62]
+    MX7 = X[63]
+    MY7 = X[64]
+    FV7 = X[66]
+    FS7 = X[67]
+    OFFSET7 = X[68]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    WP12 = QP2*W22
+    WP22 = -QP2*W12
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U222 = -DV112 - DV332
+    U312 = -2*WP22
+    U322 = 2*WP12
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 3
+    W13 = C3*W12 + S3*QP2
+    W23 = C3*QP2 - S3*W12
+    W33 = QP3 - W22
+    WP13 = C3*WP12 + QP3*W23
+    WP23 = -S3*WP12 - QP3*W13
+    DV113 = W13**2
+    DV123 = W13*W23
+    DV133 = W13*W33
+    DV223 = W23**2
+    DV233 = W23*W33
+    DV333 = W33**2
+    DW233 = DV223 - DV333
+    DW313 = DV333 - DV113
+    DW123 = DV113 - DV223
+    U113 = -DV223 - DV333
+    U123 = WP22 + DV123
+    U133 = WP23 + DV133
+    U213 = DV123 - WP22
+    U223 = -DV113 - DV333
+    U233 = DV233 - WP13
+    U313 = DV133 - WP23
+    U323 = WP13 + DV233
+    VSP33 = -RL3*U322
+    VSP13 = VP12 - RL3*DV122
+    VSP23 = VP22 - RL3*U222
+    VP13 = C3*VSP13 + S3*VSP33
+    VP23 = C3*VSP33 - S3*VSP13
+    # Link 4
+    W14 = C4*W13 + S4*W33
+    W24 = C4*W33 - S4*W13
+    W34 = QP4 - W23
+    WP14 = C4*WP13 + QP4*W24 - S4*WP22
+    WP24 = -C4*WP22 - S4*WP13 - QP4*W14
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = WP23 + DV124
+    U134 = WP24 + DV134
+    U214 = DV124 - WP23
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VSP14 = VP13 + D4*U113
+    VSP24 = VP23 + D4*U213
+    VSP34 = D4*U313 - VSP23
+    VP14 = C4*VSP14 + S4*VSP34
+    VP24 = C4*VSP34 - S4*VSP14
+    # Link 5
+    W15 = C5*W14 - S5*W34
+    W25 = -C5*W34 - S5*W14
+    W35 = QP5 + W24
+    WP15 = C5*WP14 + S5*WP23 + QP5*W25
+    WP25 = C5*WP23 - S5*WP14 - QP5*W15
+    DV115 = W15**2
+    DV125 = W15*W25
+    DV135 = W15*W35
+    DV225 = W25**2
+    DV235 = W25*W35
+    DV335 = W35**2
+    DW235 = DV225 - DV335
+    DW315 = DV335 - DV115
+    DW125 = DV115 - DV225
+    U115 = -DV225 - DV335
+    U125 = DV125 - WP24
+    U135 = WP25 + DV135
+    U215 = WP24 + DV125
+    U225 = -DV115 - DV335
+    U235 = DV235 - WP15
+    U315 = DV135 - WP25
+    U325 = WP15 + DV235
+    VSP15 = VP14 + RL5*U124 - D4*U114
+    VSP25 = VP24 + RL5*U224 - D4*U214
+    VSP35 = RL5*U324 - VSP24 - D4*U314
+    VP15 = C5*VSP15 - S5*VSP35
+    VP25 = -C5*VSP35 - S5*VSP15
+    # Link 6
+    W16 = C6*W15 + S6*W35
+    W26 = C6*W35 - S6*W15
+    W36 = QP6 - W25
+    WP16 = C6*WP15 + S6*WP24 + QP6*W26
+    WP26 = C6*WP24 - S6*WP15 - QP6*W16
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV136 = W16*W36
+    DV226 = W26**2
+    DV236 = W26*W36
+    DV336 = W36**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = WP25 + DV126
+    U136 = WP26 + DV136
+    U216 = DV126 - WP25
+    U226 = -DV116 - DV336
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = WP16 + DV236
+    VP16 = C6*VP15 + S6*VSP25
+    VP26 = C6*VSP25 - S6*VP15
+    # Link 7
+    W17 = C7*W16 + S7*W36
+    W27 = C7*W36 - S7*W16
+    W37 = QP7 - W26
+    WP17 = C7*WP16 + QP7*W27 - S7*WP25
+    WP27 = -C7*WP25 - S7*WP16 - QP7*W17
+    DV117 = W17**2
+    DV127 = W17*W27
+    DV137 = W17*W37
+    DV227 = W27**2
+    DV237 = W27*W37
+    DV337 = W37**2
+    DW237 = DV227 - DV337
+    DW317 = DV337 - DV117
+    DW127 = DV117 - DV227
+    U117 = -DV227 - DV337
+    U127 = WP26 + DV127
+    U137 = WP27 + DV137
+    U217 = DV127 - WP26
+    U227 = -DV117 - DV337
+    U237 = DV237 - WP17
+    U317 = DV137 - WP27
+    U327 = WP17 + DV237
+    VSP17 = VP16 + D7*U116
+    VSP27 = VP26 + D7*U216
+    VSP37 = D7*U316 - VP25
+    VP17 = C7*VSP17 + S7*VSP37
+    VP27 = C7*VSP37 - S7*VSP17
+    # Joint 7
+    F17 = MX7*U117 + MY7*U127
+    F27 = MX7*U217 + MY7*U227
+    F37 = MX7*U317 + MY7*U327
+    N17 = XX7R*WP17 + ZZ7*DV237 + YZ7*DW237 + XZ7*U217 - XY7*U317 - MY7*VSP27
+    N27 = (XX7R - ZZ7)*DV137 + XZ7*DW317 + XY7*U327 + MX7*VSP27 - YZ7*U127
+    N37 = XY7*DW127 + YZ7*U137 + MX7*VP27 - ZZ7*WP26 - XX7R*DV127 - XZ7*U237 - MY7*VP17
+    FDI17 = C7*F17 - S7*F27
+    FDI37 = S7*F17 + C7*F27
+    # Joint 6
+    F16 = MX6R*U116 + MY6R*U126
+    F26 = MX6R*U216 + MY6R*U226
+    F36 = MX6R*U316 + MY6R*U326
+    E16 = FDI17 + F16
+    E26 = F26 - F37
+    E36 = FDI37 + F36
+    N16 = XX6R*WP16 + ZZ6R*DV236 + YZ6*DW236 + XZ6*U216 - XY6R*U316 - MY6R*VP25
+    N26 = (XX6R - ZZ6R)*DV136 + XZ6*DW316 + XY6R*U326 + MX6R*VP25 - YZ6*U126
+    N36 = XY6R*DW126 + YZ6*U136 + MX6R*VP26 - ZZ6R*WP25 - XX6R*DV126 - XZ6*U236 - MY6R*VP16
+    NE16 = C7*N17 + N16 - S7*N27
+    NE26 = N26 - N37 - D7*FDI37
+    NE36 = S7*N17 + C7*N27 + N36 - D7*F37
+    FDI16 = C6*E16 - S6*E26
+    FDI36 = S6*E16 + C6*E26
+    # Joint 5
+    F15 = MX5*U115 + MY5R*U125
+    F25 = MX5*U215 + MY5R*U225
+    F35 = MX5*U315 + MY5R*U325
+    E15 = FDI16 + F15
+    E25 = F25 - E36
+    E35 = FDI36 + F35
+    N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VSP25 - XY5*U315
+    N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VSP25
+    N35 = ZZ5R*WP24 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
+    NE15 = C6*NE16 + N15 - S6*NE26
+    NE25 = N25 - NE36
+    NE35 = S6*NE16 + C6*NE26 + N35
+    FDI15 = C5*E15 - S5*E25
+    FDI35 = -S5*E15 - C5*E25
+    # Joint 4
+    F14 = MX4R*U114 + MY4R*U124
+    F24 = MX4R*U214 + MY4R*U224
+    F34 = MX4R*U314 + MY4R*U324
+    E14 = FDI15 + F14
+    E24 = E35 + F24
+    E34 = FDI35 + F34
+    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4R*U314 - MY4R*VSP24
+    N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4R*U324 + MX4R*VSP24 - YZ4*U124
+    N34 = XY4R*DW124 + YZ4*U134 + MX4R*VP24 - ZZ4R*WP23 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
+    NE14 = C5*NE15 + RL5*FDI35 + N14 - S5*NE25
+    NE24 = NE35 + D4*FDI35 + N24
+    NE34 = N34 - S5*NE15 - C5*NE25 - D4*E35 - RL5*FDI15
+    FDI14 = C4*E14 - S4*E24
+    FDI34 = S4*E14 + C4*E24
+    # Joint 3
+    F13 = MX3R*U113 + MY3R*U123
+    F23 = MX3R*U213 + MY3R*U223
+    E13 = FDI14 + F13
+    E23 = F23 - E34
+    N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3*DW233 + XZ3*U213 - XY3R*U313 - MY3R*VSP23
+    N23 = (XX3R - ZZ3R)*DV133 + XZ3*DW313 + XY3R*U323 + MX3R*VSP23 - YZ3*U123
+    N33 = XY3R*DW123 + YZ3*U133 + MX3R*VP23 - ZZ3R*WP22 - XX3R*DV123 - XZ3*U233 - MY3R*VP13
+    NE13 = C4*NE14 + N13 - S4*NE24
+    NE23 = N23 - NE34 - D4*FDI34
+    NE33 = S4*NE14 + C4*NE24 + N33 - D4*E34
+    FDI13 = C3*E13 - S3*E23
+    FDI33 = S3*E13 + C3*E23
+    # Joint 2
+    N12 = XX2R*WP12 + ZZ2R*WP12 + YZ2*DW232 + XZ2*DV122 - XY2*U312
+    N22 = XZ2*DW312 + XY2*U322 - (XX2R - ZZ2R)*WP22 - YZ2*DV122
+    N32 = XY2*DW122 + MX2*VP22 - XX2R*DV122 - MY2R*VP12
+    NE12 = C3*NE13 + N12 - S3*NE23 - RL3*FDI33
+    NE22 = N22 - NE33
+    NE32 = S3*NE13 + C3*NE23 + RL3*FDI13 + N32
+    NE31 = -S2*NE12 - C2*NE22
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
+    GAM[2] = OFFSET3 + NE33 + FV3*QP3 + FS3*np.sign(QP3)
+    GAM[3] = OFFSET4 + NE34 + FV4*QP4 + FS4*np.sign(QP4)
+    GAM[4] = OFFSET5 + NE35 + FV5*QP5 + FS5*np.sign(QP5)
+    GAM[5] = OFFSET6 + NE36 + FV6*QP6 + FS6*np.sign(QP6)
+    GAM[6] = OFFSET7 + N37 + FV7*QP7 + FS7*np.sign(QP7)
+
+
+def _gravity_block(q, GAM, X, RL1, RL3, D4, RL5, D7, g):
+    """Fill GAM, shape (7, N), at rest. q: (7, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    q7 = q[6]
+    OFFSET1 = X[3]
+    MX2 = X[9]
+    MY2R = X[10]
+    OFFSET2 = X[13]
+    MX3R = X[19]
+    MY3R = X[20]
+    OFFSET3 = X[24]
+    MX4R = X[30]
+    MY4R = X[31]
+    OFFSET4 = X[35]
+    MX5 = X[41]
+    MY5R = X[42]
+    OFFSET5 = X[46]
+    MX6R = X[52]
+    MY6R = X[53]
+    OFFSET6 = X[57]
+    MX7 = X[63]
+    MY7 = X[64]
+    OFFSET7 = X[68]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    # Link 2
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 3
+    VP13 = C3*VP12
+    VP23 = -S3*VP12
+    # Link 4
+    VP14 = C4*VP13 - S4*VP22
+    VP24 = -C4*VP22 - S4*VP13
+    # Link 5
+    VP15 = C5*VP14 + S5*VP23
+    VP25 = C5*VP23 - S5*VP14
+    # Link 6
+    VP16 = C6*VP15 + S6*VP24
+    VP26 = C6*VP24 - S6*VP15
+    # Link 7
+    VP17 = C7*VP16 - S7*VP25
+    VP27 = -C7*VP25 - S7*VP16
+    # Joint 7
+    N17 = -MY7*VP26
+    N27 = MX7*VP26
+    N37 = MX7*VP27 - MY7*VP17
+    # Joint 6
+    N16 = -MY6R*VP25
+    N26 = MX6R*VP25
+    N36 = MX6R*VP26 - MY6R*VP16
+    NE16 = C7*N17 + N16 - S7*N27
+    NE26 = N26 - N37
+    NE36 = S7*N17 + C7*N27 + N36
+    # Joint 5
+    N15 = MY5R*VP24
+    N25 = -MX5*VP24
+    N35 = MX5*VP25 - MY5R*VP15
+    NE15 = C6*NE16 + N15 - S6*NE26
+    NE25 = N25 - NE36
+    NE35 = S6*NE16 + C6*NE26 + N35
+    # Joint 4
+    N14 = -MY4R*VP23
+    N24 = MX4R*VP23
+    N34 = MX4R*VP24 - MY4R*VP14
+    NE14 = C5*NE15 + N14 - S5*NE25
+    NE24 = NE35 + N24
+    NE34 = N34 - S5*NE15 - C5*NE25
+    # Joint 3
+    N13 = -MY3R*VP22
+    N23 = MX3R*VP22
+    N33 = MX3R*VP23 - MY3R*VP13
+    NE13 = C4*NE14 + N13 - S4*NE24
+    NE23 = N23 - NE34
+    NE33 = S4*NE14 + C4*NE24 + N33
+    NE12 = C3*NE13 - S3*NE23
+    # Joint 2
+    N32 = MX2*VP22 - MY2R*VP12
+    NE32 = S3*NE13 + C3*NE23 + N32
+    NE31 = C2*NE33 - S2*NE12
+    # Torques
+    GAM[0] = OFFSET1 + NE31
+    GAM[1] = OFFSET2 + NE32
+    GAM[2] = OFFSET3 + NE33
+    GAM[3] = OFFSET4 + NE34
+    GAM[4] = OFFSET5 + NE35
+    GAM[5] = OFFSET6 + NE36
+    GAM[6] = OFFSET7 + N37
+
+
+def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7, g):
+    """Fill T, shape (7, 4, 4, N). q: (7, N)."""
+    # Inputs
+    q1, q2, q3, q4, q5, q6, q7 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    # Frame 2
+    R112 = C1*C2
+    R122 = -C1*S2
+    R212 = S1*C2
+    R222 = -S1*S2
+    # Frame 3
+    R113 = C3*R112 - S1*S3
+    R123 = -S1*C3 - S3*R112
+    R213 = C3*R212 + C1*S3
+    R223 = C1*C3 - S3*R212
+    R313 = -S2*C3
+    R323 = S2*S3
+    P13 = -RL3*R122
+    P23 = -RL3*R222
+    P33 = RL1 + RL3*C2
+    # Frame 4
+    R114 = C4*R113 - S4*R122
+    R124 = -C4*R122 - S4*R113
+    R214 = C4*R213 - S4*R222
+    R224 = -C4*R222 - S4*R213
+    R314 = C4*R313 + C2*S4
+    R324 = C2*C4 - S4*R313
+    P14 = P13 + D4*R113
+    P24 = P23 + D4*R213
+    P34 = P33 + D4*R313
+    # Frame 5
+    R115 = C5*R114 + S5*R123
+    R125 = C5*R123 - S5*R114
+    R215 = C5*R214 + S5*R223
+    R225 = C5*R223 - S5*R214
+    R315 = C5*R314 + S5*R323
+    R325 = C5*R323 - S5*R314
+    P15 = P14 + RL5*R124 - D4*R114
+    P25 = P24 + RL5*R224 - D4*R214
+    P35 = P34 + RL5*R324 - D4*R314
+    # Frame 6
+    R116 = C6*R115 + S6*R124
+    R126 = C6*R124 - S6*R115
+    R216 = C6*R215 + S6*R224
+    R226 = C6*R224 - S6*R215
+    R316 = C6*R315 + S6*R324
+    R326 = C6*R324 - S6*R315
+    # Frame 7
+    R117 = C7*R116 - S7*R125
+    R127 = -C7*R125 - S7*R116
+    R217 = C7*R216 - S7*R225
+    R227 = -C7*R225 - S7*R216
+    R317 = C7*R316 - S7*R325
+    R327 = -C7*R325 - S7*R316
+    P17 = P15 + D7*R116
+    P27 = P25 + D7*R216
+    P37 = P35 + D7*R316
+    # Poses
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 0, 2] = 0.0
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 1, 2] = 0.0
+    T[0, 2, 0] = 0.0
+    T[0, 2, 1] = 0.0
+    T[0, 2, 2] = 1.0
+    T[0, 0, 3] = 0.0
+    T[0, 1, 3] = 0.0
+    T[0, 2, 3] = RL1
+    T[1, 0, 0] = R112
+    T[1, 0, 1] = R122
+    T[1, 0, 2] = -S1
+    T[1, 1, 0] = R212
+    T[1, 1, 1] = R222
+    T[1, 1, 2] = C1
+    T[1, 2, 0] = -S2
+    T[1, 2, 1] = -C2
+    T[1, 2, 2] = 0.0
+    T[1, 0, 3] = 0.0
+    T[1, 1, 3] = 0.0
+    T[1, 2, 3] = RL1
+    T[2, 0, 0] = R113
+    T[2, 0, 1] = R123
+    T[2, 0, 2] = -R122
+    T[2, 1, 0] = R213
+    T[2, 1, 1] = R223
+    T[2, 1, 2] = -R222
+    T[2, 2, 0] = R313
+    T[2, 2, 1] = R323
+    T[2, 2, 2] = C2
+    T[2, 0, 3] = P13
+    T[2, 1, 3] = P23
+    T[2, 2, 3] = P33
+    T[3, 0, 0] = R114
+    T[3, 0, 1] = R124
+    T[3, 0, 2] = -R123
+    T[3, 1, 0] = R214
+    T[3, 1, 1] = R224
+    T[3, 1, 2] = -R223
+    T[3, 2, 0] = R314
+    T[3, 2, 1] = R324
+    T[3, 2, 2] = -R323
+    T[3, 0, 3] = P14
+    T[3, 1, 3] = P24
+    T[3, 2, 3] = P34
+    T[4, 0, 0] = R115
+    T[4, 0, 1] = R125
+    T[4, 0, 2] = R124
+    T[4, 1, 0] = R215
+    T[4, 1, 1] = R225
+    T[4, 1, 2] = R224
+    T[4, 2, 0] = R315
+    T[4, 2, 1] = R325
+    T[4, 2, 2] = R324
+    T[4, 0, 3] = P15
+    T[4, 1, 3] = P25
+    T[4, 2, 3] = P35
+    T[5, 0, 0] = R116
+    T[5, 0, 1] = R126
+    T[5, 0, 2] = -R125
+    T[5, 1, 0] = R216
+    T[5, 1, 1] = R226
+    T[5, 1, 2] = -R225
+    T[5, 2, 0] = R316
+    T[5, 2, 1] = R326
+    T[5, 2, 2] = -R325
+    T[5, 0, 3] = P15
+    T[5, 1, 3] = P25
+    T[5, 2, 3] = P35
+    T[6, 0, 0] = R117
+    T[6, 0, 1] = R127
+    T[6, 0, 2] = -R126
+    T[6, 1, 0] = R217
+    T[6, 1, 1] = R227
+    T[6, 1, 2] = -R226
+    T[6, 2, 0] = R317
+    T[6, 2, 1] = R327
+    T[6, 2, 2] = -R326
+    T[6, 0, 3] = P17
+    T[6, 1, 3] = P27
+    T[6, 2, 3] = P37

@@ -1,0 +1,411 @@
+"""Planar arm, 2 revolute joints, vertical plane: base parameters, regressor, dynamics.
+
+GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.1.0. Do not edit; symgen generate planar_2r
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+    j  ant  sigma  alpha   d  theta  r
+    1    0      0      0   0     q1  0
+    2    1      0      0  D2     q2  0
+Gravity     acceleration (0, -g, 0) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1, q2
+Element     FV      viscous: along q1, q2
+Element     FS      coulomb: along q1, q2
+Element     OFFSET  offset: along q1, q2
+
+Base parameters, 13 of 28; Gautier and Khalil (1990), exact
+    ZZ1R = ZZ1 + Ia1 + D2**2*M2
+    MX1R = MX1 + D2*M2
+    as they are: MY1 FV1 FS1 OFFSET1 ZZ2 MX2 MY2 Ia2 FV2 FS2 OFFSET2
+No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2
+
+Cost per sample
+    regressor         16 multiplications, 10 additions, 2 sin, 2 cos
+    inverse_dynamics  28 multiplications, 22 additions, 2 sin, 2 cos
+    inertia_matrix    7 multiplications, 6 additions, 1 sin, 1 cos
+    bias              22 multiplications, 15 additions, 2 sin, 2 cos
+    gravity           10 multiplications, 7 additions, 2 sin, 2 cos
+    frame_poses       2 multiplications, 1 additions, 2 sin, 2 cos
+"""
+
+import numpy as np
+
+SCHEMA = 1
+NAME = 'planar_2r'
+SOURCE_SHA256 = '42ca3cd332bb23550600b8a94036134d00e0a3ee1e3b0d0625eed309c8742beb'
+JOINTS = (1, 2)
+CONSTANTS = {'D2': 0.5, 'g': 9.81}
+BASE_PARAMETERS = ('ZZ1R', 'MX1R', 'MY1', 'FV1', 'FS1', 'OFFSET1', 'ZZ2', 'MX2', 'MY2', 'Ia2', 'FV2', 'FS2', 'OFFSET2')
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'MX1R': 'kg*m', 'MY1': 'kg*m', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m',
+    'ZZ2': 'kg*m**2', 'MX2': 'kg*m', 'MY2': 'kg*m', 'Ia2': 'kg*m**2', 'FV2': 'N*m*s/rad', 'FS2': 'N*m',
+    'OFFSET2': 'N*m',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + D2**2*M2', 'MX1R': 'MX1 + D2*M2', 'MY1': 'MY1', 'FV1': 'FV1', 'FS1': 'FS1',
+    'OFFSET1': 'OFFSET1', 'ZZ2': 'ZZ2', 'MX2': 'MX2', 'MY2': 'MY2', 'Ia2': 'Ia2', 'FV2': 'FV2', 'FS2': 'FS2',
+    'OFFSET2': 'OFFSET2',
+}
+NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MZ1', 'M1', 'XX2', 'XY2', 'XZ2', 'YY2', 'YZ2', 'MZ2')
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x.", "x.", "x.", "x.", "x.", "x.", "xx", "xx", "xx", ".x", ".x", ".x", ".x",
+)])
+DRIVES = None
+LIMITS = {
+    'q': ((-3.141592653589793, 3.141592653589793), (-3.141592653589793, 3.141592653589793)), 'qd': (3.0, 5.0),
+    'qdd': (20.0, 40.0), 'tau': (40.0, 15.0),
+}
+VALUES = {
+    'XX1': 0.0012, 'XY1': 0.0, 'XZ1': 0.0, 'YY1': 0.1673, 'YZ1': 0.0, 'ZZ1': 0.1673, 'MX1': 0.5, 'MY1': 0.0, 'MZ1': 0.0,
+    'M1': 2.0, 'Ia1': 0.05, 'FV1': 0.5, 'FS1': 0.8, 'OFFSET1': 0.1, 'XX2': 0.0012, 'XY2': 0.0, 'XZ2': 0.0,
+    'YY2': 0.1673, 'YZ2': 0.0, 'ZZ2': 0.1673, 'MX2': 0.5, 'MY2': 0.0, 'MZ2': 0.0, 'M2': 2.0, 'Ia2': 0.02, 'FV2': 0.3,
+    'FS2': 0.4, 'OFFSET2': -0.05,
+}
+_PATHS = {1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)))}
+
+
+class Store(np.ndarray):
+    """Room for a regressor, made by `store`; views and copies of one are no stores."""
+
+    ready = False
+
+    def __array_finalize__(self, parent):
+        self.ready = False
+
+
+def store(N):
+    """Room for N samples, shape (13, 2, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
+    S = np.zeros((13, 2, N)).view(Store)
+    S[5, 0] = 1.0
+    S[12, 1] = 1.0
+    S.ready = True
+    return S
+
+
+def _fill(block, result, states, *arguments):
+    """Run `block` over 4096 samples at a time; states (N, 2) enter as contiguous rows (2, B), result ends in samples."""
+    states = [np.asarray(x, dtype=float).reshape(-1, 2) for x in states]
+    N = len(states[0])
+    B = max(N, 1) if N <= 8192 else 4096
+    for t in range(0, N, B):
+        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+    return result
+
+
+def _filled_store(q, qd, qdd, out, *constants):
+    N = np.size(q) // 2
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (13, 2, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(13, 2, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
+
+
+def _by_sample(result, q):
+    """Samples first; for a single state (n,) without them."""
+    result = np.moveaxis(result, -1, 0)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def base_parameters(standard, *, D2=0.5, g=9.81):
+    """X, shape (13,), from the 28 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, Ia2, FV2, FS2, OFFSET2
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + D2**2*M2
+    MX1R = MX1 + D2*M2
+    return np.array([
+        ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2, MX2, MY2, Ia2, FV2, FS2, OFFSET2,
+    ])
+
+
+def regressor(q, qd, qdd, *, out=None, D2=0.5, g=9.81):
+    """D of Gamma = D X, shape (N, 2, 13); q, qd, qdd of shape (N, 2) or (2,), rad or m and seconds.
+
+    A view on one store of shape (13, 2, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
+    faults, up to several times the arithmetic for large N.
+    """
+    S = _filled_store(q, qd, qdd, out, D2, g)
+    D = S.transpose(2, 1, 0)
+    return D[0] if np.ndim(q) == 1 else D
+
+
+def observation_matrix(q, qd, qdd, *, out=None, D2=0.5, g=9.81):
+    """W of Y = W X + rho, shape (2*N, 13), Fortran order, rows joint-major: the same store, no copy."""
+    return _filled_store(q, qd, qdd, out, D2, g).reshape(13, -1).T
+
+
+def inverse_dynamics(q, qd, qdd, X, *, D2=0.5, g=9.81):
+    """Joint torques Gamma, shape (N, 2), of base parameters X, shape (13,)."""
+    return _by_sample(_fill(_inverse_dynamics_block, np.empty((2, np.size(q) // 2)), (q, qd, qdd), X, D2, g), q)
+
+
+def inertia_matrix(q, X, *, D2=0.5, g=9.81):
+    """A(q), shape (N, 2, 2), actuators included."""
+    return _by_sample(_fill(_inertia_matrix_block, np.empty((2, 2, np.size(q) // 2)), (q,), X, D2, g), q)
+
+
+def bias(q, qd, X, *, D2=0.5, g=9.81):
+    """Gamma at qdd = 0, shape (N, 2): Coriolis, centrifugal, gravity, friction and offset."""
+    return _by_sample(_fill(_bias_block, np.empty((2, np.size(q) // 2)), (q, qd), X, D2, g), q)
+
+
+def gravity(q, X, *, D2=0.5, g=9.81):
+    """Gamma at rest without friction, shape (N, 2): gravity, offset and springs (a base parameter may mix them)."""
+    return _by_sample(_fill(_gravity_block, np.empty((2, np.size(q) // 2)), (q,), X, D2, g), q)
+
+
+def forward_dynamics(q, qd, tau, X, *, D2=0.5, g=9.81):
+    """qdd = A(q)**-1 (tau - bias), shape (N, 2)."""
+    A, H = inertia_matrix(q, X, D2=D2, g=g), bias(q, qd, X, D2=D2, g=g)
+    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, D2=0.5, g=9.81):
+    """Homogeneous transform of every frame j in frame 0, shape (N, 2, 4, 4), at index j - 1."""
+    T = np.zeros((2, 4, 4, np.size(q) // 2))
+    T[:, 3, 3] = 1.0
+    return _by_sample(_fill(_frame_poses_block, T, (q,), D2, g), q)
+
+
+def jacobian(q, *, frame=2, D2=0.5, g=9.81):
+    """J, shape (N, 6, 2): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, D2=D2, g=g).reshape(-1, 2, 4, 4)
+    J = np.zeros((len(T), 6, 2))
+    P = T[:, (2 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[2 if frame is None else frame]:
+        z = T[:, j - 1, :3, 2]
+        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
+        for k, rate in rates:
+            J[:, :3, k] += rate * v
+            J[:, 3:, k] += rate * w
+    return J[0] if np.ndim(q) == 1 else J
+
+
+def _regressor_block(q, qd, qdd, D, D2, g):
+    """Fill D, shape (13, 2, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (2, N)."""
+    # Inputs
+    q1, q2 = q
+    QP1, QP2 = qd
+    QDP1, QDP2 = qdd
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    # Link 1
+    DV331 = QP1**2
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    W32 = QP1 + QP2
+    WP32 = QDP1 + QDP2
+    DV332 = W32**2
+    VSP12 = VP11 - D2*DV331
+    VSP22 = VP21 + D2*QDP1
+    VP12 = C2*VSP12 + S2*VSP22
+    VP22 = C2*VSP22 - S2*VSP12
+    # Joint axes Z and velocities V seen from link 2
+    V121 = D2*S2
+    V221 = D2*C2
+    # Joint 1
+    D[0, 0] = QDP1                            # DG1ZZ1
+    D[1, 0] = VP21                            # DG1MX1
+    D[2, 0] = -VP11                           # DG1MY1
+    D[3, 0] = QP1                             # DG1FV1
+    D[4, 0] = np.sign(QP1)                    # DG1FS1
+    D[6, 0] = WP32                            # DG1ZZ2
+    D[7, 0] = VP22 + WP32*V221 - DV332*V121   # DG1MX2
+    D[8, 0] = -VP12 - WP32*V121 - DV332*V221  # DG1MY2
+    # Joint 2
+    D[6, 1] = WP32           # DG2ZZ2
+    D[7, 1] = VP22           # DG2MX2
+    D[8, 1] = -VP12          # DG2MY2
+    D[9, 1] = QDP2           # DG2Ia2
+    D[10, 1] = QP2           # DG2FV2
+    D[11, 1] = np.sign(QP2)  # DG2FS2
+
+
+def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, g):
+    """Fill GAM, shape (2, N). q, qd, qdd: (2, N)."""
+    # Inputs
+    q1, q2 = q
+    QP1, QP2 = qd
+    QDP1, QDP2 = qdd
+    ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2, MX2, MY2, Ia2, FV2, FS2, OFFSET2 = X
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    # Link 1
+    DV331 = QP1**2
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    W32 = QP1 + QP2
+    WP32 = QDP1 + QDP2
+    DV332 = W32**2
+    VSP12 = VP11 - D2*DV331
+    VSP22 = VP21 + D2*QDP1
+    VP12 = C2*VSP12 + S2*VSP22
+    VP22 = C2*VSP22 - S2*VSP12
+    # Joint 2
+    F12 = -MX2*DV332 - MY2*WP32
+    F22 = MX2*WP32 - MY2*DV332
+    N32 = ZZ2*WP32 + MX2*VP22 - MY2*VP12
+    FDI22 = S2*F12 + C2*F22
+    # Joint 1
+    N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
+    NE31 = N32 + D2*FDI22 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + N32 + Ia2*QDP2 + FV2*QP2 + FS2*np.sign(QP2)
+
+
+def _inertia_matrix_block(q, A, X, D2, g):
+    """Fill A, shape (2, 2, N): column i is Gamma for a unit acceleration of joint i from rest. q: (2, N)."""
+    # Inputs
+    q2 = q[1]
+    ZZ1R = X[0]
+    ZZ2 = X[6]
+    MX2 = X[7]
+    MY2 = X[8]
+    Ia2 = X[9]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    # Link 2
+    VP121 = D2*S2
+    VP221 = D2*C2
+    # Joint 2
+    N321 = ZZ2 + MX2*VP221 - MY2*VP121
+    FDI221 = MX2*C2 - MY2*S2
+    # Joint 1
+    NE311 = ZZ1R + N321 + D2*FDI221
+    # Inertia matrix
+    A[0, 0] = NE311
+    A[1, 0] = A[0, 1] = N321
+    A[1, 1] = ZZ2 + Ia2
+
+
+def _bias_block(q, qd, GAM, X, D2, g):
+    """Fill GAM, shape (2, N), for qdd = 0. q, qd: (2, N)."""
+    # Inputs
+    q1, q2 = q
+    QP1, QP2 = qd
+    MX1R = X[1]
+    MY1 = X[2]
+    FV1 = X[3]
+    FS1 = X[4]
+    OFFSET1 = X[5]
+    MX2 = X[7]
+    MY2 = X[8]
+    FV2 = X[10]
+    FS2 = X[11]
+    OFFSET2 = X[12]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    # Link 1
+    DV331 = QP1**2
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    W32 = QP1 + QP2
+    DV332 = W32**2
+    VSP12 = VP11 - D2*DV331
+    VP12 = C2*VSP12 + S2*VP21
+    VP22 = C2*VP21 - S2*VSP12
+    # Joint 2
+    F12 = -MX2*DV332
+    F22 = -MY2*DV332
+    N32 = MX2*VP22 - MY2*VP12
+    FDI22 = S2*F12 + C2*F22
+    # Joint 1
+    N31 = MX1R*VP21 - MY1*VP11
+    NE31 = N32 + D2*FDI22 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + N32 + FV2*QP2 + FS2*np.sign(QP2)
+
+
+def _gravity_block(q, GAM, X, D2, g):
+    """Fill GAM, shape (2, N), at rest. q: (2, N)."""
+    # Inputs
+    q1, q2 = q
+    MX1R = X[1]
+    MY1 = X[2]
+    OFFSET1 = X[5]
+    MX2 = X[7]
+    MY2 = X[8]
+    OFFSET2 = X[12]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    # Link 1
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    VP12 = C2*VP11 + S2*VP21
+    VP22 = C2*VP21 - S2*VP11
+    # Joint 2
+    N32 = MX2*VP22 - MY2*VP12
+    # Joint 1
+    N31 = MX1R*VP21 - MY1*VP11
+    NE31 = N32 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31
+    GAM[1] = OFFSET2 + N32
+
+
+def _frame_poses_block(q, T, D2, g):
+    """Fill T, shape (2, 4, 4, N). q: (2, N)."""
+    # Inputs
+    q1, q2 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    th12 = q1 + q2
+    C12 = np.cos(th12)
+    S12 = np.sin(th12)
+    # Frame 2
+    P12 = D2*C1
+    P22 = D2*S1
+    # Poses
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 0, 2] = 0.0
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 1, 2] = 0.0
+    T[0, 2, 0] = 0.0
+    T[0, 2, 1] = 0.0
+    T[0, 2, 2] = 1.0
+    T[0, 0, 3] = 0.0
+    T[0, 1, 3] = 0.0
+    T[0, 2, 3] = 0.0
+    T[1, 0, 0] = C12
+    T[1, 0, 1] = -S12
+    T[1, 0, 2] = 0.0
+    T[1, 1, 0] = S12
+    T[1, 1, 1] = C12
+    T[1, 1, 2] = 0.0
+    T[1, 2, 0] = 0.0
+    T[1, 2, 1] = 0.0
+    T[1, 2, 2] = 1.0
+    T[1, 0, 3] = P12
+    T[1, 1, 3] = P22
+    T[1, 2, 3] = 0.0

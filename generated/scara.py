@@ -1,0 +1,586 @@
+"""SCARA with joints RRRP: base parameters, regressor, dynamics.
+
+GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.1.0. Do not edit; symgen generate scara
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+    j  ant  sigma  alpha   d  theta   r
+    1    0      0      0   0     q1   0
+    2    1      0      0  D2     q2   0
+    3    2      0      0  D3     q3   0
+    4    3      1      0   0      0  q4
+Gravity     acceleration (0, 0, -g) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1, q2, q3, q4
+Element     FV      viscous: along q1, q2, q3, q4
+Element     FS      coulomb: along q1, q2, q3, q4
+Element     OFFSET  offset: along q1, q2, q3, q4
+
+Base parameters, 22 of 56; Gautier and Khalil (1990), exact
+    ZZ1R = ZZ1 + Ia1 + D2**2*(M2 + M3 - Ia4)
+    ZZ2R = ZZ2 + D3**2*(M3 - Ia4)
+    MX2R = MX2 + D3*(M3 - Ia4)
+    ZZ3R = ZZ3 + ZZ4
+    MX3R = MX3 + MX4
+    MY3R = MY3 + MY4
+    M4R = M4 + Ia4
+    OFFSET4R = OFFSET4 - g*Ia4
+    as they are: FV1 FS1 OFFSET1 MY2 Ia2 FV2 FS2 OFFSET2 Ia3 FV3 FS3 OFFSET3 FV4 FS4
+No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 XX4 XY4 XZ4 YY4 YZ4 MZ4
+
+Cost per sample
+    regressor         39 multiplications, 28 additions, 2 sin, 2 cos
+    inverse_dynamics  51 multiplications, 44 additions, 2 sin, 2 cos
+    inertia_matrix    29 multiplications, 27 additions, 2 sin, 2 cos
+    bias              38 multiplications, 29 additions, 2 sin, 2 cos
+    gravity           1 multiplications, 1 additions, 0 sin, 0 cos
+    frame_poses       4 multiplications, 4 additions, 3 sin, 3 cos
+"""
+
+import numpy as np
+
+SCHEMA = 1
+NAME = 'scara'
+SOURCE_SHA256 = 'de085ba960d792c532df597174021ff49a1ac3e6792828ed279c37ecd08941b0'
+JOINTS = (1, 2, 3, 4)
+CONSTANTS = {'D2': 0.425, 'D3': 0.375, 'g': 9.81}
+BASE_PARAMETERS = (
+    'ZZ1R', 'FV1', 'FS1', 'OFFSET1', 'ZZ2R', 'MX2R', 'MY2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'ZZ3R', 'MX3R', 'MY3R',
+    'Ia3', 'FV3', 'FS3', 'OFFSET3', 'M4R', 'FV4', 'FS4', 'OFFSET4R',
+)
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
+    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4',
+    'MX4', 'MY4', 'MZ4', 'M4', 'Ia4', 'FV4', 'FS4', 'OFFSET4',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m', 'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m',
+    'MY2': 'kg*m', 'Ia2': 'kg*m**2', 'FV2': 'N*m*s/rad', 'FS2': 'N*m', 'OFFSET2': 'N*m', 'ZZ3R': 'kg*m**2',
+    'MX3R': 'kg*m', 'MY3R': 'kg*m', 'Ia3': 'kg*m**2', 'FV3': 'N*m*s/rad', 'FS3': 'N*m', 'OFFSET3': 'N*m', 'M4R': 'kg',
+    'FV4': 'N*s/m', 'FS4': 'N', 'OFFSET4R': 'N',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + D2**2*(M2 + M3 - Ia4)', 'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1',
+    'ZZ2R': 'ZZ2 + D3**2*(M3 - Ia4)', 'MX2R': 'MX2 + D3*(M3 - Ia4)', 'MY2': 'MY2', 'Ia2': 'Ia2', 'FV2': 'FV2',
+    'FS2': 'FS2', 'OFFSET2': 'OFFSET2', 'ZZ3R': 'ZZ3 + ZZ4', 'MX3R': 'MX3 + MX4', 'MY3R': 'MY3 + MY4', 'Ia3': 'Ia3',
+    'FV3': 'FV3', 'FS3': 'FS3', 'OFFSET3': 'OFFSET3', 'M4R': 'M4 + Ia4', 'FV4': 'FV4', 'FS4': 'FS4',
+    'OFFSET4R': 'OFFSET4 - g*Ia4',
+}
+NO_EFFECT = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'XX2', 'XY2', 'XZ2', 'YY2', 'YZ2', 'MZ2', 'XX3',
+    'XY3', 'XZ3', 'YY3', 'YZ3', 'MZ3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'MZ4',
+)
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x...", "x...", "x...", "x...", "xx..", "xx..", "xx..", ".x..", ".x..", ".x..", ".x..", "xxx.", "xxx.", "xxx.",
+    "..x.", "..x.", "..x.", "..x.", "xx.x", "...x", "...x", "...x",
+)])
+DRIVES = None
+LIMITS = {}
+VALUES = {}
+_PATHS = {
+    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
+    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),))),
+    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 1, ((3, 1.0),))),
+}
+
+
+class Store(np.ndarray):
+    """Room for a regressor, made by `store`; views and copies of one are no stores."""
+
+    ready = False
+
+    def __array_finalize__(self, parent):
+        self.ready = False
+
+
+def store(N):
+    """Room for N samples, shape (22, 4, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
+    S = np.zeros((22, 4, N)).view(Store)
+    S[3, 0] = 1.0
+    S[10, 1] = 1.0
+    S[17, 2] = 1.0
+    S[21, 3] = 1.0
+    S.ready = True
+    return S
+
+
+def _fill(block, result, states, *arguments):
+    """Run `block` over 4096 samples at a time; states (N, 4) enter as contiguous rows (4, B), result ends in samples."""
+    states = [np.asarray(x, dtype=float).reshape(-1, 4) for x in states]
+    N = len(states[0])
+    B = max(N, 1) if N <= 8192 else 4096
+    for t in range(0, N, B):
+        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+    return result
+
+
+def _filled_store(q, qd, qdd, out, *constants):
+    N = np.size(q) // 4
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (22, 4, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(22, 4, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
+
+
+def _by_sample(result, q):
+    """Samples first; for a single state (n,) without them."""
+    result = np.moveaxis(result, -1, 0)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def base_parameters(standard, *, D2=0.425, D3=0.375, g=9.81):
+    """X, shape (22,), from the 56 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
+        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + D2**2*(M2 + M3 - Ia4)
+    ZZ2R = ZZ2 + D3**2*(M3 - Ia4)
+    MX2R = MX2 + D3*(M3 - Ia4)
+    ZZ3R = ZZ3 + ZZ4
+    MX3R = MX3 + MX4
+    MY3R = MY3 + MY4
+    M4R = M4 + Ia4
+    OFFSET4R = OFFSET4 - g*Ia4
+    return np.array([
+        ZZ1R, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, Ia2, FV2, FS2, OFFSET2, ZZ3R, MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, M4R,
+        FV4, FS4, OFFSET4R,
+    ])
+
+
+def regressor(q, qd, qdd, *, out=None, D2=0.425, D3=0.375, g=9.81):
+    """D of Gamma = D X, shape (N, 4, 22); q, qd, qdd of shape (N, 4) or (4,), rad or m and seconds.
+
+    A view on one store of shape (22, 4, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
+    faults, up to several times the arithmetic for large N.
+    """
+    S = _filled_store(q, qd, qdd, out, D2, D3, g)
+    D = S.transpose(2, 1, 0)
+    return D[0] if np.ndim(q) == 1 else D
+
+
+def observation_matrix(q, qd, qdd, *, out=None, D2=0.425, D3=0.375, g=9.81):
+    """W of Y = W X + rho, shape (4*N, 22), Fortran order, rows joint-major: the same store, no copy."""
+    return _filled_store(q, qd, qdd, out, D2, D3, g).reshape(22, -1).T
+
+
+def inverse_dynamics(q, qd, qdd, X, *, D2=0.425, D3=0.375, g=9.81):
+    """Joint torques Gamma, shape (N, 4), of base parameters X, shape (22,)."""
+    return _by_sample(_fill(_inverse_dynamics_block, np.empty((4, np.size(q) // 4)), (q, qd, qdd), X, D2, D3, g), q)
+
+
+def inertia_matrix(q, X, *, D2=0.425, D3=0.375, g=9.81):
+    """A(q), shape (N, 4, 4), actuators included."""
+    return _by_sample(_fill(_inertia_matrix_block, np.empty((4, 4, np.size(q) // 4)), (q,), X, D2, D3, g), q)
+
+
+def bias(q, qd, X, *, D2=0.425, D3=0.375, g=9.81):
+    """Gamma at qdd = 0, shape (N, 4): Coriolis, centrifugal, gravity, friction and offset."""
+    return _by_sample(_fill(_bias_block, np.empty((4, np.size(q) // 4)), (q, qd), X, D2, D3, g), q)
+
+
+def gravity(q, X, *, D2=0.425, D3=0.375, g=9.81):
+    """Gamma at rest without friction, shape (N, 4): gravity, offset and springs (a base parameter may mix them)."""
+    return _by_sample(_fill(_gravity_block, np.empty((4, np.size(q) // 4)), (q,), X, D2, D3, g), q)
+
+
+def forward_dynamics(q, qd, tau, X, *, D2=0.425, D3=0.375, g=9.81):
+    """qdd = A(q)**-1 (tau - bias), shape (N, 4)."""
+    A, H = inertia_matrix(q, X, D2=D2, D3=D3, g=g), bias(q, qd, X, D2=D2, D3=D3, g=g)
+    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, D2=0.425, D3=0.375, g=9.81):
+    """Homogeneous transform of every frame j in frame 0, shape (N, 4, 4, 4), at index j - 1."""
+    T = np.zeros((4, 4, 4, np.size(q) // 4))
+    T[:, 3, 3] = 1.0
+    return _by_sample(_fill(_frame_poses_block, T, (q,), D2, D3, g), q)
+
+
+def jacobian(q, *, frame=4, D2=0.425, D3=0.375, g=9.81):
+    """J, shape (N, 6, 4): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, D2=D2, D3=D3, g=g).reshape(-1, 4, 4, 4)
+    J = np.zeros((len(T), 6, 4))
+    P = T[:, (4 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[4 if frame is None else frame]:
+        z = T[:, j - 1, :3, 2]
+        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
+        for k, rate in rates:
+            J[:, :3, k] += rate * v
+            J[:, 3:, k] += rate * w
+    return J[0] if np.ndim(q) == 1 else J
+
+
+def _regressor_block(q, qd, qdd, D, D2, D3, g):
+    """Fill D, shape (22, 4, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (4, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    QP1, QP2, QP3, QP4 = qd
+    QDP1, QDP2, QDP3, QDP4 = qdd
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    # Link 1
+    DV331 = QP1**2
+    # Link 2
+    W32 = QP1 + QP2
+    WP32 = QDP1 + QDP2
+    DV332 = W32**2
+    VSP12 = -D2*DV331
+    VSP22 = D2*QDP1
+    VP12 = C2*VSP12 + S2*VSP22
+    VP22 = C2*VSP22 - S2*VSP12
+    # Link 3
+    W33 = QP3 + W32
+    WP33 = QDP3 + WP32
+    DV333 = W33**2
+    VSP13 = VP12 - D3*DV332
+    VSP23 = VP22 + D3*WP32
+    VP13 = C3*VSP13 + S3*VSP23
+    VP23 = C3*VSP23 - S3*VSP13
+    # Link 4
+    VP34 = QDP4 + g
+    # Joint axes Z and velocities V seen from link 2
+    V121 = D2*S2
+    V221 = D2*C2
+    # Joint axes Z and velocities V seen from link 3
+    VS231 = D3 + V221
+    V131 = C3*V121 + S3*VS231
+    V231 = C3*VS231 - S3*V121
+    V132 = D3*S3
+    V232 = D3*C3
+    # Joint 1
+    D[0, 0] = QDP1                             # DG1ZZ1
+    D[1, 0] = QP1                              # DG1FV1
+    D[2, 0] = np.sign(QP1)                     # DG1FS1
+    D[4, 0] = WP32                             # DG1ZZ2
+    D[5, 0] = VP22 + WP32*V221 - DV332*V121    # DG1MX2
+    D[6, 0] = -VP12 - WP32*V121 - DV332*V221   # DG1MY2
+    D[11, 0] = WP33                            # DG1ZZ3
+    D[12, 0] = VP23 + WP33*V231 - DV333*V131   # DG1MX3
+    D[13, 0] = -VP13 - WP33*V131 - DV333*V231  # DG1MY3
+    D[18, 0] = VP13*V131 + VP23*V231           # DG1M4
+    # Joint 2
+    D[4, 1] = WP32                             # DG2ZZ2
+    D[5, 1] = VP22                             # DG2MX2
+    D[6, 1] = -VP12                            # DG2MY2
+    D[7, 1] = QDP2                             # DG2Ia2
+    D[8, 1] = QP2                              # DG2FV2
+    D[9, 1] = np.sign(QP2)                     # DG2FS2
+    D[11, 1] = WP33                            # DG2ZZ3
+    D[12, 1] = VP23 + WP33*V232 - DV333*V132   # DG2MX3
+    D[13, 1] = -VP13 - WP33*V132 - DV333*V232  # DG2MY3
+    D[18, 1] = VP13*V132 + VP23*V232           # DG2M4
+    # Joint 3
+    D[11, 2] = WP33          # DG3ZZ3
+    D[12, 2] = VP23          # DG3MX3
+    D[13, 2] = -VP13         # DG3MY3
+    D[14, 2] = QDP3          # DG3Ia3
+    D[15, 2] = QP3           # DG3FV3
+    D[16, 2] = np.sign(QP3)  # DG3FS3
+    # Joint 4
+    D[18, 3] = VP34          # DG4M4
+    D[19, 3] = QP4           # DG4FV4
+    D[20, 3] = np.sign(QP4)  # DG4FS4
+
+
+def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, g):
+    """Fill GAM, shape (4, N). q, qd, qdd: (4, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    QP1, QP2, QP3, QP4 = qd
+    QDP1, QDP2, QDP3, QDP4 = qdd
+    (
+        ZZ1R, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, Ia2, FV2, FS2, OFFSET2, ZZ3R, MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, M4R,
+        FV4, FS4, OFFSET4R
+    ) = X
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    # Link 1
+    DV331 = QP1**2
+    # Link 2
+    W32 = QP1 + QP2
+    WP32 = QDP1 + QDP2
+    DV332 = W32**2
+    VSP12 = -D2*DV331
+    VSP22 = D2*QDP1
+    VP12 = C2*VSP12 + S2*VSP22
+    VP22 = C2*VSP22 - S2*VSP12
+    # Link 3
+    W33 = QP3 + W32
+    WP33 = QDP3 + WP32
+    DV333 = W33**2
+    VSP13 = VP12 - D3*DV332
+    VSP23 = VP22 + D3*WP32
+    VP13 = C3*VSP13 + S3*VSP23
+    VP23 = C3*VSP23 - S3*VSP13
+    # Link 4
+    VP34 = QDP4 + g
+    # Joint 4
+    F14 = M4R*VP13
+    F24 = M4R*VP23
+    F34 = M4R*VP34
+    # Joint 3
+    F13 = -MX3R*DV333 - MY3R*WP33
+    F23 = MX3R*WP33 - MY3R*DV333
+    E13 = F14 + F13
+    E23 = F24 + F23
+    N33 = ZZ3R*WP33 + MX3R*VP23 - MY3R*VP13
+    FDI13 = C3*E13 - S3*E23
+    FDI23 = S3*E13 + C3*E23
+    # Joint 2
+    F12 = -MX2R*DV332 - MY2*WP32
+    F22 = MX2R*WP32 - MY2*DV332
+    E12 = FDI13 + F12
+    E22 = FDI23 + F22
+    N32 = ZZ2R*WP32 + MX2R*VP22 - MY2*VP12
+    NE32 = N33 + D3*FDI23 + N32
+    FDI22 = S2*E12 + C2*E22
+    # Joint 1
+    N31 = ZZ1R*QDP1
+    NE31 = NE32 + D2*FDI22 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + Ia2*QDP2 + FV2*QP2 + FS2*np.sign(QP2)
+    GAM[2] = OFFSET3 + N33 + Ia3*QDP3 + FV3*QP3 + FS3*np.sign(QP3)
+    GAM[3] = OFFSET4R + F34 + FV4*QP4 + FS4*np.sign(QP4)
+
+
+def _inertia_matrix_block(q, A, X, D2, D3, g):
+    """Fill A, shape (4, 4, N): column i is Gamma for a unit acceleration of joint i from rest. q: (4, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    ZZ1R = X[0]
+    ZZ2R = X[4]
+    MX2R = X[5]
+    MY2 = X[6]
+    Ia2 = X[7]
+    ZZ3R = X[11]
+    MX3R = X[12]
+    MY3R = X[13]
+    Ia3 = X[14]
+    M4R = X[18]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    # Link 2
+    VP121 = D2*S2
+    VP221 = D2*C2
+    # Link 3
+    VSP231 = D3 + VP221
+    VP131 = C3*VP121 + S3*VSP231
+    VP231 = C3*VSP231 - S3*VP121
+    # Joint 4
+    F141 = M4R*VP131
+    F241 = M4R*VP231
+    # Joint 3
+    E131 = F141 - MY3R
+    E231 = MX3R + F241
+    N331 = ZZ3R + MX3R*VP231 - MY3R*VP131
+    FDI131 = C3*E131 - S3*E231
+    FDI231 = S3*E131 + C3*E231
+    # Joint 2
+    E121 = FDI131 - MY2
+    E221 = MX2R + FDI231
+    N321 = ZZ2R + MX2R*VP221 - MY2*VP121
+    NE321 = N331 + D3*FDI231 + N321
+    FDI221 = S2*E121 + C2*E221
+    # Joint 1
+    NE311 = ZZ1R + NE321 + D2*FDI221
+    # Link 3
+    VP132 = D3*S3
+    VP232 = D3*C3
+    # Joint 4
+    F142 = M4R*VP132
+    F242 = M4R*VP232
+    # Joint 3
+    E132 = F142 - MY3R
+    E232 = MX3R + F242
+    N332 = ZZ3R + MX3R*VP232 - MY3R*VP132
+    FDI232 = S3*E132 + C3*E232
+    # Joint 2
+    NE322 = ZZ2R + N332 + D3*FDI232
+    # Inertia matrix
+    A[0, 0] = NE311
+    A[1, 0] = A[0, 1] = NE321
+    A[2, 0] = A[0, 2] = N331
+    A[3, 0] = A[0, 3] = 0.0
+    A[1, 1] = Ia2 + NE322
+    A[2, 1] = A[1, 2] = N332
+    A[3, 1] = A[1, 3] = 0.0
+    A[2, 2] = ZZ3R + Ia3
+    A[3, 2] = A[2, 3] = 0.0
+    A[3, 3] = M4R
+
+
+def _bias_block(q, qd, GAM, X, D2, D3, g):
+    """Fill GAM, shape (4, N), for qdd = 0. q, qd: (4, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    QP1, QP2, QP3, QP4 = qd
+    FV1 = X[1]
+    FS1 = X[2]
+    OFFSET1 = X[3]
+    MX2R = X[5]
+    MY2 = X[6]
+    FV2 = X[8]
+    FS2 = X[9]
+    OFFSET2 = X[10]
+    MX3R = X[12]
+    MY3R = X[13]
+    FV3 = X[15]
+    FS3 = X[16]
+    OFFSET3 = X[17]
+    M4R = X[18]
+    FV4 = X[19]
+    FS4 = X[20]
+    OFFSET4R = X[21]
+    # Constants
+    F34 = M4R*g
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    # Link 1
+    DV331 = QP1**2
+    # Link 2
+    W32 = QP1 + QP2
+    DV332 = W32**2
+    VSP12 = -D2*DV331
+    VP12 = C2*VSP12
+    VP22 = -S2*VSP12
+    # Link 3
+    W33 = QP3 + W32
+    DV333 = W33**2
+    VSP13 = VP12 - D3*DV332
+    VP13 = C3*VSP13 + S3*VP22
+    VP23 = C3*VP22 - S3*VSP13
+    # Joint 4
+    F14 = M4R*VP13
+    F24 = M4R*VP23
+    # Joint 3
+    F13 = -MX3R*DV333
+    F23 = -MY3R*DV333
+    E13 = F14 + F13
+    E23 = F24 + F23
+    N33 = MX3R*VP23 - MY3R*VP13
+    FDI13 = C3*E13 - S3*E23
+    FDI23 = S3*E13 + C3*E23
+    # Joint 2
+    F12 = -MX2R*DV332
+    F22 = -MY2*DV332
+    E12 = FDI13 + F12
+    E22 = FDI23 + F22
+    N32 = MX2R*VP22 - MY2*VP12
+    NE32 = N33 + D3*FDI23 + N32
+    FDI22 = S2*E12 + C2*E22
+    NE31 = NE32 + D2*FDI22
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
+    GAM[2] = OFFSET3 + N33 + FV3*QP3 + FS3*np.sign(QP3)
+    GAM[3] = OFFSET4R + F34 + FV4*QP4 + FS4*np.sign(QP4)
+
+
+def _gravity_block(q, GAM, X, D2, D3, g):
+    """Fill GAM, shape (4, N), at rest. q: (4, N)."""
+    # Inputs
+    OFFSET1 = X[3]
+    OFFSET2 = X[10]
+    OFFSET3 = X[17]
+    M4R = X[18]
+    OFFSET4R = X[21]
+    # Constants
+    F34 = M4R*g
+    # Torques
+    GAM[0] = OFFSET1
+    GAM[1] = OFFSET2
+    GAM[2] = OFFSET3
+    GAM[3] = OFFSET4R + F34
+
+
+def _frame_poses_block(q, T, D2, D3, g):
+    """Fill T, shape (4, 4, 4, N). q: (4, N)."""
+    # Inputs
+    q1, q2, q3, q4 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    th12 = q1 + q2
+    C12 = np.cos(th12)
+    S12 = np.sin(th12)
+    th123 = th12 + q3
+    C123 = np.cos(th123)
+    S123 = np.sin(th123)
+    # Frame 2
+    P12 = D2*C1
+    P22 = D2*S1
+    # Frame 3
+    P13 = P12 + D3*C12
+    P23 = P22 + D3*S12
+    # Poses
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 0, 2] = 0.0
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 1, 2] = 0.0
+    T[0, 2, 0] = 0.0
+    T[0, 2, 1] = 0.0
+    T[0, 2, 2] = 1.0
+    T[0, 0, 3] = 0.0
+    T[0, 1, 3] = 0.0
+    T[0, 2, 3] = 0.0
+    T[1, 0, 0] = C12
+    T[1, 0, 1] = -S12
+    T[1, 0, 2] = 0.0
+    T[1, 1, 0] = S12
+    T[1, 1, 1] = C12
+    T[1, 1, 2] = 0.0
+    T[1, 2, 0] = 0.0
+    T[1, 2, 1] = 0.0
+    T[1, 2, 2] = 1.0
+    T[1, 0, 3] = P12
+    T[1, 1, 3] = P22
+    T[1, 2, 3] = 0.0
+    T[2, 0, 0] = C123
+    T[2, 0, 1] = -S123
+    T[2, 0, 2] = 0.0
+    T[2, 1, 0] = S123
+    T[2, 1, 1] = C123
+    T[2, 1, 2] = 0.0
+    T[2, 2, 0] = 0.0
+    T[2, 2, 1] = 0.0
+    T[2, 2, 2] = 1.0
+    T[2, 0, 3] = P13
+    T[2, 1, 3] = P23
+    T[2, 2, 3] = 0.0
+    T[3, 0, 0] = C123
+    T[3, 0, 1] = -S123
+    T[3, 0, 2] = 0.0
+    T[3, 1, 0] = S123
+    T[3, 1, 1] = C123
+    T[3, 1, 2] = 0.0
+    T[3, 2, 0] = 0.0
+    T[3, 2, 1] = 0.0
+    T[3, 2, 2] = 1.0
+    T[3, 0, 3] = P13
+    T[3, 1, 3] = P23
+    T[3, 2, 3] = q4

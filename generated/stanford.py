@@ -1,0 +1,1491 @@
+"""Stanford arm, 5 revolute joints and prismatic joint 3: base parameters, regressor, dynamics.
+
+GENERATED from stanford.yaml, sha256 123dd30dfd2b, by symgen 0.1.0. Do not edit; symgen generate stanford
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+    j  ant  sigma  alpha  d  theta    r
+    1    0      0      0  0     q1  RL1
+    2    1      0  -pi/2  0     q2  RL2
+    3    2      1   pi/2  0      0   q3
+    4    3      0      0  0     q4    0
+    5    4      0  -pi/2  0     q5    0
+    6    5      0   pi/2  0     q6    0
+Gravity     acceleration (0, 0, -g) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1, q2, q3, q4, q5, q6
+Element     FV      viscous: along q1, q2, q3, q4, q5, q6
+Element     FS      coulomb: along q1, q2, q3, q4, q5, q6
+Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
+
+Base parameters, 55 of 84; Gautier and Khalil (1990), exact
+    ZZ1R = ZZ1 + Ia1 + YY2 + ZZ3 + 2*RL2*MZ2 + RL2**2*M2
+    XX2R = XX2 - YY2 + XX3 - ZZ3 + YY4
+    XY2R = XY2 - XZ3
+    XZ2R = XZ2 + XY3
+    YZ2R = YZ2 - YZ3
+    ZZ2R = ZZ2 + Ia2 + YY3 + YY4
+    MZ3R = MZ3 + MZ4
+    M3R = M3 + M4 + M5 + M6
+    XX4R = XX4 - YY4 + YY5
+    ZZ4R = ZZ4 + YY5
+    MY4R = MY4 + MZ5
+    XX5R = XX5 - YY5 + YY6
+    ZZ5R = ZZ5 + YY6
+    MY5R = MY5 - MZ6
+    XX6R = XX6 - YY6
+    as they are: FV1 FS1 OFFSET1 MX2 MY2 FV2 FS2 OFFSET2 MX3 MY3 Ia3 FV3 FS3 OFFSET3 XY4 XZ4 YZ4 MX4 Ia4 FV4 FS4 OFFSET4
+        XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5 OFFSET5 XY6 XZ6 YZ6 ZZ6 MX6 MY6 Ia6 FV6 FS6 OFFSET6
+No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1
+
+Cost per sample
+    regressor         338 multiplications, 245 additions, 4 sin, 4 cos
+    inverse_dynamics  243 multiplications, 235 additions, 4 sin, 4 cos
+    inertia_matrix    242 multiplications, 173 additions, 4 sin, 4 cos
+    bias              228 multiplications, 209 additions, 4 sin, 4 cos
+    gravity           50 multiplications, 35 additions, 4 sin, 4 cos
+    frame_poses       43 multiplications, 19 additions, 5 sin, 5 cos
+"""
+
+import numpy as np
+
+SCHEMA = 1
+NAME = 'stanford'
+SOURCE_SHA256 = '123dd30dfd2b9527df33fa3e71210b5a2675fce73ae34cbd2999e32ed15a31a7'
+JOINTS = (1, 2, 3, 4, 5, 6)
+CONSTANTS = {'RL1': 0.412, 'RL2': 0.154, 'g': 9.81}
+BASE_PARAMETERS = (
+    'ZZ1R', 'FV1', 'FS1', 'OFFSET1', 'XX2R', 'XY2R', 'XZ2R', 'YZ2R', 'ZZ2R', 'MX2', 'MY2', 'FV2', 'FS2', 'OFFSET2',
+    'MX3', 'MY3', 'MZ3R', 'M3R', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4R', 'XY4', 'XZ4', 'YZ4', 'ZZ4R', 'MX4', 'MY4R',
+    'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX5R', 'XY5', 'XZ5', 'YZ5', 'ZZ5R', 'MX5', 'MY5R', 'Ia5', 'FV5', 'FS5', 'OFFSET5',
+    'XX6R', 'XY6', 'XZ6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'Ia6', 'FV6', 'FS6', 'OFFSET6',
+)
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
+    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4',
+    'MX4', 'MY4', 'MZ4', 'M4', 'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX5', 'XY5', 'XZ5', 'YY5', 'YZ5', 'ZZ5', 'MX5', 'MY5',
+    'MZ5', 'M5', 'Ia5', 'FV5', 'FS5', 'OFFSET5', 'XX6', 'XY6', 'XZ6', 'YY6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'MZ6', 'M6',
+    'Ia6', 'FV6', 'FS6', 'OFFSET6',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m', 'XX2R': 'kg*m**2', 'XY2R': 'kg*m**2',
+    'XZ2R': 'kg*m**2', 'YZ2R': 'kg*m**2', 'ZZ2R': 'kg*m**2', 'MX2': 'kg*m', 'MY2': 'kg*m', 'FV2': 'N*m*s/rad',
+    'FS2': 'N*m', 'OFFSET2': 'N*m', 'MX3': 'kg*m', 'MY3': 'kg*m', 'MZ3R': 'kg*m', 'M3R': 'kg', 'Ia3': 'kg',
+    'FV3': 'N*s/m', 'FS3': 'N', 'OFFSET3': 'N', 'XX4R': 'kg*m**2', 'XY4': 'kg*m**2', 'XZ4': 'kg*m**2', 'YZ4': 'kg*m**2',
+    'ZZ4R': 'kg*m**2', 'MX4': 'kg*m', 'MY4R': 'kg*m', 'Ia4': 'kg*m**2', 'FV4': 'N*m*s/rad', 'FS4': 'N*m',
+    'OFFSET4': 'N*m', 'XX5R': 'kg*m**2', 'XY5': 'kg*m**2', 'XZ5': 'kg*m**2', 'YZ5': 'kg*m**2', 'ZZ5R': 'kg*m**2',
+    'MX5': 'kg*m', 'MY5R': 'kg*m', 'Ia5': 'kg*m**2', 'FV5': 'N*m*s/rad', 'FS5': 'N*m', 'OFFSET5': 'N*m',
+    'XX6R': 'kg*m**2', 'XY6': 'kg*m**2', 'XZ6': 'kg*m**2', 'YZ6': 'kg*m**2', 'ZZ6': 'kg*m**2', 'MX6': 'kg*m',
+    'MY6': 'kg*m', 'Ia6': 'kg*m**2', 'FV6': 'N*m*s/rad', 'FS6': 'N*m', 'OFFSET6': 'N*m',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + YY2 + ZZ3 + 2*RL2*MZ2 + RL2**2*M2', 'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1',
+    'XX2R': 'XX2 - YY2 + XX3 - ZZ3 + YY4', 'XY2R': 'XY2 - XZ3', 'XZ2R': 'XZ2 + XY3', 'YZ2R': 'YZ2 - YZ3',
+    'ZZ2R': 'ZZ2 + Ia2 + YY3 + YY4', 'MX2': 'MX2', 'MY2': 'MY2', 'FV2': 'FV2', 'FS2': 'FS2', 'OFFSET2': 'OFFSET2',
+    'MX3': 'MX3', 'MY3': 'MY3', 'MZ3R': 'MZ3 + MZ4', 'M3R': 'M3 + M4 + M5 + M6', 'Ia3': 'Ia3', 'FV3': 'FV3',
+    'FS3': 'FS3', 'OFFSET3': 'OFFSET3', 'XX4R': 'XX4 - YY4 + YY5', 'XY4': 'XY4', 'XZ4': 'XZ4', 'YZ4': 'YZ4',
+    'ZZ4R': 'ZZ4 + YY5', 'MX4': 'MX4', 'MY4R': 'MY4 + MZ5', 'Ia4': 'Ia4', 'FV4': 'FV4', 'FS4': 'FS4',
+    'OFFSET4': 'OFFSET4', 'XX5R': 'XX5 - YY5 + YY6', 'XY5': 'XY5', 'XZ5': 'XZ5', 'YZ5': 'YZ5', 'ZZ5R': 'ZZ5 + YY6',
+    'MX5': 'MX5', 'MY5R': 'MY5 - MZ6', 'Ia5': 'Ia5', 'FV5': 'FV5', 'FS5': 'FS5', 'OFFSET5': 'OFFSET5',
+    'XX6R': 'XX6 - YY6', 'XY6': 'XY6', 'XZ6': 'XZ6', 'YZ6': 'YZ6', 'ZZ6': 'ZZ6', 'MX6': 'MX6', 'MY6': 'MY6',
+    'Ia6': 'Ia6', 'FV6': 'FV6', 'FS6': 'FS6', 'OFFSET6': 'OFFSET6',
+}
+NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MX1', 'MY1', 'MZ1', 'M1')
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x.....", "x.....", "x.....", "x.....", "xx....", "xx....", "xx....", "xx....", ".x....", "xx....", "xx....",
+    ".x....", ".x....", ".x....", "xxx...", "xxx...", "xxx...", "xxx...", "..x...", "..x...", "..x...", "..x...",
+    "xx.x..", "xx.x..", "xx.x..", "xx.x..", "xx.x..", "xxxx..", "xxxx..", "...x..", "...x..", "...x..", "...x..",
+    "xx.xx.", "xx.xx.", "xx.xx.", "xx.xx.", "xx.xx.", "xxxxx.", "xxxxx.", "....x.", "....x.", "....x.", "....x.",
+    "xx.xxx", "xx.xxx", "xx.xxx", "xx.xxx", "xx.xxx", "xxxxxx", "xxxxxx", ".....x", ".....x", ".....x", ".....x",
+)])
+DRIVES = None
+LIMITS = {}
+VALUES = {}
+_PATHS = {
+    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
+    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),))),
+    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
+    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),))),
+    6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),))),
+}
+
+
+class Store(np.ndarray):
+    """Room for a regressor, made by `store`; views and copies of one are no stores."""
+
+    ready = False
+
+    def __array_finalize__(self, parent):
+        self.ready = False
+
+
+def store(N):
+    """Room for N samples, shape (55, 6, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
+    S = np.zeros((55, 6, N)).view(Store)
+    S[3, 0] = 1.0
+    S[13, 1] = 1.0
+    S[21, 2] = 1.0
+    S[32, 3] = 1.0
+    S[43, 4] = 1.0
+    S[54, 5] = 1.0
+    S.ready = True
+    return S
+
+
+def _fill(block, result, states, *arguments):
+    """Run `block` over 4096 samples at a time; states (N, 6) enter as contiguous rows (6, B), result ends in samples."""
+    states = [np.asarray(x, dtype=float).reshape(-1, 6) for x in states]
+    N = len(states[0])
+    B = max(N, 1) if N <= 8192 else 4096
+    for t in range(0, N, B):
+        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+    return result
+
+
+def _filled_store(q, qd, qdd, out, *constants):
+    N = np.size(q) // 6
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (55, 6, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(55, 6, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
+
+
+def _by_sample(result, q):
+    """Samples first; for a single state (n,) without them."""
+    result = np.moveaxis(result, -1, 0)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def base_parameters(standard, *, RL1=0.412, RL2=0.154, g=9.81):
+    """X, shape (55,), from the 84 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
+        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5,
+        M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + YY2 + ZZ3 + 2*RL2*MZ2 + RL2**2*M2
+    XX2R = XX2 - YY2 + XX3 - ZZ3 + YY4
+    XY2R = XY2 - XZ3
+    XZ2R = XZ2 + XY3
+    YZ2R = YZ2 - YZ3
+    ZZ2R = ZZ2 + Ia2 + YY3 + YY4
+    MZ3R = MZ3 + MZ4
+    M3R = M3 + M4 + M5 + M6
+    XX4R = XX4 - YY4 + YY5
+    ZZ4R = ZZ4 + YY5
+    MY4R = MY4 + MZ5
+    XX5R = XX5 - YY5 + YY6
+    ZZ5R = ZZ5 + YY6
+    MY5R = MY5 - MZ6
+    XX6R = XX6 - YY6
+    return np.array([
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2, MY2, FV2, FS2, OFFSET2, MX3, MY3, MZ3R, M3R, Ia3, FV3,
+        FS3, OFFSET3, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R,
+        Ia5, FV5, FS5, OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6,
+    ])
+
+
+def regressor(q, qd, qdd, *, out=None, RL1=0.412, RL2=0.154, g=9.81):
+    """D of Gamma = D X, shape (N, 6, 55); q, qd, qdd of shape (N, 6) or (6,), rad or m and seconds.
+
+    A view on one store of shape (55, 6, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
+    faults, up to several times the arithmetic for large N.
+    """
+    S = _filled_store(q, qd, qdd, out, RL1, RL2, g)
+    D = S.transpose(2, 1, 0)
+    return D[0] if np.ndim(q) == 1 else D
+
+
+def observation_matrix(q, qd, qdd, *, out=None, RL1=0.412, RL2=0.154, g=9.81):
+    """W of Y = W X + rho, shape (6*N, 55), Fortran order, rows joint-major: the same store, no copy."""
+    return _filled_store(q, qd, qdd, out, RL1, RL2, g).reshape(55, -1).T
+
+
+def inverse_dynamics(q, qd, qdd, X, *, RL1=0.412, RL2=0.154, g=9.81):
+    """Joint torques Gamma, shape (N, 6), of base parameters X, shape (55,)."""
+    return _by_sample(_fill(_inverse_dynamics_block, np.empty((6, np.size(q) // 6)), (q, qd, qdd), X, RL1, RL2, g), q)
+
+
+def inertia_matrix(q, X, *, RL1=0.412, RL2=0.154, g=9.81):
+    """A(q), shape (N, 6, 6), actuators included."""
+    return _by_sample(_fill(_inertia_matrix_block, np.empty((6, 6, np.size(q) // 6)), (q,), X, RL1, RL2, g), q)
+
+
+def bias(q, qd, X, *, RL1=0.412, RL2=0.154, g=9.81):
+    """Gamma at qdd = 0, shape (N, 6): Coriolis, centrifugal, gravity, friction and offset."""
+    return _by_sample(_fill(_bias_block, np.empty((6, np.size(q) // 6)), (q, qd), X, RL1, RL2, g), q)
+
+
+def gravity(q, X, *, RL1=0.412, RL2=0.154, g=9.81):
+    """Gamma at rest without friction, shape (N, 6): gravity, offset and springs (a base parameter may mix them)."""
+    return _by_sample(_fill(_gravity_block, np.empty((6, np.size(q) // 6)), (q,), X, RL1, RL2, g), q)
+
+
+def forward_dynamics(q, qd, tau, X, *, RL1=0.412, RL2=0.154, g=9.81):
+    """qdd = A(q)**-1 (tau - bias), shape (N, 6)."""
+    A, H = inertia_matrix(q, X, RL1=RL1, RL2=RL2, g=g), bias(q, qd, X, RL1=RL1, RL2=RL2, g=g)
+    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, RL1=0.412, RL2=0.154, g=9.81):
+    """Homogeneous transform of every frame j in frame 0, shape (N, 6, 4, 4), at index j - 1."""
+    T = np.zeros((6, 4, 4, np.size(q) // 6))
+    T[:, 3, 3] = 1.0
+    return _by_sample(_fill(_frame_poses_block, T, (q,), RL1, RL2, g), q)
+
+
+def jacobian(q, *, frame=6, RL1=0.412, RL2=0.154, g=9.81):
+    """J, shape (N, 6, 6): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, RL1=RL1, RL2=RL2, g=g).reshape(-1, 6, 4, 4)
+    J = np.zeros((len(T), 6, 6))
+    P = T[:, (6 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[6 if frame is None else frame]:
+        z = T[:, j - 1, :3, 2]
+        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
+        for k, rate in rates:
+            J[:, :3, k] += rate * v
+            J[:, 3:, k] += rate * w
+    return J[0] if np.ndim(q) == 1 else J
+
+
+def _regressor_block(q, qd, qdd, D, RL1, RL2, g):
+    """Fill D, shape (55, 6, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    QP1, QP2, QP3, QP4, QP5, QP6 = qd
+    QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 1
+    DV331 = QP1**2
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    U232 = S2*QDP1
+    U132 = -C2*QDP1
+    DV232 = QP2*W22
+    WP12 = DV232 - U232
+    DV132 = QP2*W12
+    WP22 = U132 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U122 = DV122 - QDP2
+    U212 = QDP2 + DV122
+    U222 = -DV112 - DV332
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    VSP12 = -RL2*QDP1
+    VSP22 = -RL2*DV331
+    VP12 = C2*VSP12 - g*S2
+    VP22 = -g*C2 - S2*VSP12
+    # Link 3
+    DF2MZ3 = -q3*U122
+    VSP13 = VP12 + DF2MZ3
+    VSP23 = VP22 - q3*U222
+    VSP33 = VSP22 - q3*U322
+    QP3x2 = 2*QP3
+    VP13 = VSP13 + QP2*QP3x2
+    VP23 = VSP33 - W12*QP3x2
+    VP33 = QDP3 - VSP23
+    # Link 4
+    W14 = C4*W12 + S4*QP2
+    W24 = C4*QP2 - S4*W12
+    W34 = QP4 - W22
+    WP14 = C4*WP12 + S4*QDP2 + QP4*W24
+    WP24 = C4*QDP2 - S4*WP12 - QP4*W14
+    WP34 = QDP4 - WP22
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = DV124 - WP34
+    U134 = WP24 + DV134
+    U214 = WP34 + DV124
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VP14 = C4*VP13 + S4*VP23
+    VP24 = C4*VP23 - S4*VP13
+    # Link 5
+    W15 = C5*W14 - S5*W34
+    W25 = -C5*W34 - S5*W14
+    W35 = QP5 + W24
+    WP15 = C5*WP14 + QP5*W25 - S5*WP34
+    WP25 = -C5*WP34 - S5*WP14 - QP5*W15
+    WP35 = QDP5 + WP24
+    DV115 = W15**2
+    DV125 = W15*W25
+    DV135 = W15*W35
+    DV225 = W25**2
+    DV235 = W25*W35
+    DV335 = W35**2
+    DW235 = DV225 - DV335
+    DW315 = DV335 - DV115
+    DW125 = DV115 - DV225
+    U115 = -DV225 - DV335
+    U125 = DV125 - WP35
+    U135 = WP25 + DV135
+    U215 = WP35 + DV125
+    U225 = -DV115 - DV335
+    U235 = DV235 - WP15
+    U315 = DV135 - WP25
+    U325 = WP15 + DV235
+    VP15 = C5*VP14 - S5*VP33
+    VP25 = -C5*VP33 - S5*VP14
+    # Link 6
+    W16 = C6*W15 + S6*W35
+    W26 = C6*W35 - S6*W15
+    W36 = QP6 - W25
+    WP16 = C6*WP15 + S6*WP35 + QP6*W26
+    WP26 = C6*WP35 - S6*WP15 - QP6*W16
+    WP36 = QDP6 - WP25
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV136 = W16*W36
+    DV226 = W26**2
+    DV236 = W26*W36
+    DV336 = W36**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = DV126 - WP36
+    U136 = WP26 + DV136
+    U216 = WP36 + DV126
+    U226 = -DV116 - DV336
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = WP16 + DV236
+    VP16 = C6*VP15 + S6*VP24
+    VP26 = C6*VP24 - S6*VP15
+    # Joint axes Z and velocities V seen from link 2
+    V121 = -RL2*C2
+    V221 = RL2*S2
+    # Joint axes Z and velocities V seen from link 3
+    V231 = S2*q3
+    # Joint axes Z and velocities V seen from link 4
+    Z141 = -S2*C4
+    Z241 = S2*S4
+    V141 = C4*V121 + S4*V231
+    V241 = C4*V231 - S4*V121
+    V142 = q3*C4
+    V242 = -q3*S4
+    # Joint axes Z and velocities V seen from link 5
+    Z151 = C5*Z141 - C2*S5
+    Z251 = -C2*C5 - S5*Z141
+    V151 = C5*V141 + S5*V221
+    V251 = C5*V221 - S5*V141
+    Z152 = S4*C5
+    Z252 = -S4*S5
+    V152 = C5*V142
+    V252 = -S5*V142
+    # Joint axes Z and velocities V seen from link 6
+    Z161 = C6*Z151 + S6*Z241
+    Z261 = C6*Z241 - S6*Z151
+    V161 = C6*V151 + S6*V241
+    V261 = C6*V241 - S6*V151
+    Z162 = C6*Z152 + C4*S6
+    Z262 = C4*C6 - S6*Z152
+    V162 = C6*V152 + S6*V242
+    V262 = C6*V242 - S6*V152
+    V163 = -S5*C6
+    V263 = S5*S6
+    # Contributions that several joints share
+    U112V121 = U112*V121
+    U212V221 = U212*V221
+    U122V121 = U122*V121
+    U222V221 = U222*V221
+    DV134Z241 = DV134*Z241
+    C4DV134 = C4*DV134
+    DV135Z251 = DV135*Z251
+    DV135Z252 = DV135*Z252
+    C5DV135 = C5*DV135
+    DV136Z261 = DV136*Z261
+    DV136Z262 = DV136*Z262
+    DV136V263 = DV136*V263
+    C6DV136 = C6*DV136
+    # Joint 1
+    D[0, 0] = QDP1                                                    # DG1ZZ1
+    D[1, 0] = QP1                                                     # DG1FV1
+    D[2, 0] = np.sign(QP1)                                            # DG1FS1
+    D[4, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
+    D[5, 0] = S2*U312 - C2*U322                                       # DG1XY2
+    D[6, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
+    D[7, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
+    D[9, 0] = C2*VSP22 + U112V121 + U212V221                          # DG1MX2
+    D[10, 0] = U122V121 + U222V221 - S2*VSP22                         # DG1MY2
+    D[14, 0] = C2*VP23 + U212V221 + U112V121 + U312*V231              # DG1MX3
+    D[15, 0] = U132*V121 + U232*V221 - S2*VP33 - C2*VP13 - DV331*V231  # DG1MY3
+    D[16, 0] = S2*VP23 - U222V221 - U122V121 - U322*V231              # DG1MZ3
+    D[17, 0] = VP13*V121 + VP23*V231 - VP33*V221                      # DG1M3
+    D[22, 0] = WP14*Z141 + DV134Z241 - C2*DV124                       # DG1XX4
+    D[23, 0] = U324*Z241 + C2*DW124 - U314*Z141                       # DG1XY4
+    D[24, 0] = U214*Z141 + DW314*Z241 - C2*U234                       # DG1XZ4
+    D[25, 0] = DW234*Z141 + C2*U134 - U124*Z241                       # DG1YZ4
+    D[26, 0] = DV234*Z141 + C2*WP34 - DV134Z241                       # DG1ZZ4
+    D[27, 0] = C2*VP24 + U114*V141 + U214*V241 - VP33*Z241 - U314*V221  # DG1MX4
+    D[28, 0] = VP33*Z141 + U124*V141 + U224*V241 - C2*VP14 - U324*V221  # DG1MY4
+    D[33, 0] = WP15*Z151 + DV135Z251 - DV125*Z241                     # DG1XX5
+    D[34, 0] = U325*Z251 + DW125*Z241 - U315*Z151                     # DG1XY5
+    D[35, 0] = U215*Z151 + DW315*Z251 - U235*Z241                     # DG1XZ5
+    D[36, 0] = DW235*Z151 + U135*Z241 - U125*Z251                     # DG1YZ5
+    D[37, 0] = DV235*Z151 + WP35*Z241 - DV135Z251                     # DG1ZZ5
+    D[38, 0] = VP25*Z241 + U115*V151 + U215*V251 + U315*V241 - VP24*Z251  # DG1MX5
+    D[39, 0] = VP24*Z151 + U125*V151 + U225*V251 + U325*V241 - VP15*Z241  # DG1MY5
+    D[44, 0] = WP16*Z161 + DV136Z261 + DV126*Z251                     # DG1XX6
+    D[45, 0] = U326*Z261 - U316*Z161 - DW126*Z251                     # DG1XY6
+    D[46, 0] = U216*Z161 + DW316*Z261 + U236*Z251                     # DG1XZ6
+    D[47, 0] = DW236*Z161 - U126*Z261 - U136*Z251                     # DG1YZ6
+    D[48, 0] = DV236*Z161 - DV136Z261 - WP36*Z251                     # DG1ZZ6
+    D[49, 0] = VP25*Z261 + U116*V161 + U216*V261 - VP26*Z251 - U316*V251  # DG1MX6
+    D[50, 0] = VP16*Z251 + U126*V161 + U226*V261 - VP25*Z161 - U326*V251  # DG1MY6
+    # Joint 2
+    D[4, 1] = -DV122                                                  # DG2XX2
+    D[5, 1] = DW122                                                   # DG2XY2
+    D[6, 1] = -U232                                                   # DG2XZ2
+    D[7, 1] = U132                                                    # DG2YZ2
+    D[8, 1] = QDP2                                                    # DG2ZZ2
+    D[9, 1] = VP22                                                    # DG2MX2
+    D[10, 1] = -VP12                                                  # DG2MY2
+    D[11, 1] = QP2                                                    # DG2FV2
+    D[12, 1] = np.sign(QP2)                                           # DG2FS2
+    D[14, 1] = q3*U112 - VP33                                         # DG2MX3
+    D[15, 1] = q3*U132                                                # DG2MY3
+    D[16, 1] = DF2MZ3 + VP13                                          # DG2MZ3
+    D[17, 1] = q3*VP13                                                # DG2M3
+    D[22, 1] = S4*WP14 + C4DV134                                      # DG2XX4
+    D[23, 1] = C4*U324 - S4*U314                                      # DG2XY4
+    D[24, 1] = S4*U214 + C4*DW314                                     # DG2XZ4
+    D[25, 1] = S4*DW234 - C4*U124                                     # DG2YZ4
+    D[26, 1] = S4*DV234 - C4DV134                                     # DG2ZZ4
+    D[27, 1] = U114*V142 + U214*V242 - C4*VP33                        # DG2MX4
+    D[28, 1] = S4*VP33 + U124*V142 + U224*V242                        # DG2MY4
+    D[33, 1] = WP15*Z152 + DV135Z252 - C4*DV125                       # DG2XX5
+    D[34, 1] = U325*Z252 + C4*DW125 - U315*Z152                       # DG2XY5
+    D[35, 1] = U215*Z152 + DW315*Z252 - C4*U235                       # DG2XZ5
+    D[36, 1] = DW235*Z152 + C4*U135 - U125*Z252                       # DG2YZ5
+    D[37, 1] = DV235*Z152 + C4*WP35 - DV135Z252                       # DG2ZZ5
+    D[38, 1] = C4*VP25 + U115*V152 + U215*V252 + U315*V242 - VP24*Z252  # DG2MX5
+    D[39, 1] = VP24*Z152 + U125*V152 + U225*V252 + U325*V242 - C4*VP15  # DG2MY5
+    D[44, 1] = WP16*Z162 + DV136Z262 + DV126*Z252                     # DG2XX6
+    D[45, 1] = U326*Z262 - U316*Z162 - DW126*Z252                     # DG2XY6
+    D[46, 1] = U216*Z162 + DW316*Z262 + U236*Z252                     # DG2XZ6
+    D[47, 1] = DW236*Z162 - U126*Z262 - U136*Z252                     # DG2YZ6
+    D[48, 1] = DV236*Z162 - DV136Z262 - WP36*Z252                     # DG2ZZ6
+    D[49, 1] = VP25*Z262 + U116*V162 + U216*V262 - VP26*Z252 - U316*V252  # DG2MX6
+    D[50, 1] = VP16*Z252 + U126*V162 + U226*V262 - VP25*Z162 - U326*V252  # DG2MY6
+    # Joint 3
+    D[14, 2] = -U212                            # DG3MX3
+    D[15, 2] = -U232                            # DG3MY3
+    D[16, 2] = U222                             # DG3MZ3
+    D[17, 2] = VP33                             # DG3M3
+    D[18, 2] = QDP3                             # DG3Ia3
+    D[19, 2] = QP3                              # DG3FV3
+    D[20, 2] = np.sign(QP3)                     # DG3FS3
+    D[27, 2] = U314                             # DG3MX4
+    D[28, 2] = U324                             # DG3MY4
+    D[38, 2] = -S5*U115 - C5*U215               # DG3MX5
+    D[39, 2] = -S5*U125 - C5*U225               # DG3MY5
+    D[49, 2] = U116*V163 + U216*V263 + C5*U316  # DG3MX6
+    D[50, 2] = U126*V163 + U226*V263 + C5*U326  # DG3MY6
+    # Joint 4
+    D[22, 3] = -DV124                            # DG4XX4
+    D[23, 3] = DW124                             # DG4XY4
+    D[24, 3] = -U234                             # DG4XZ4
+    D[25, 3] = U134                              # DG4YZ4
+    D[26, 3] = WP34                              # DG4ZZ4
+    D[27, 3] = VP24                              # DG4MX4
+    D[28, 3] = -VP14                             # DG4MY4
+    D[29, 3] = QDP4                              # DG4Ia4
+    D[30, 3] = QP4                               # DG4FV4
+    D[31, 3] = np.sign(QP4)                      # DG4FS4
+    D[33, 3] = -S5*WP15 - C5DV135                # DG4XX5
+    D[34, 3] = S5*U315 - C5*U325                 # DG4XY5
+    D[35, 3] = -S5*U215 - C5*DW315               # DG4XZ5
+    D[36, 3] = C5*U125 - S5*DW235                # DG4YZ5
+    D[37, 3] = C5DV135 - S5*DV235                # DG4ZZ5
+    D[38, 3] = C5*VP24                           # DG4MX5
+    D[39, 3] = -S5*VP24                          # DG4MY5
+    D[44, 3] = WP16*V163 + DV136V263 - C5*DV126  # DG4XX6
+    D[45, 3] = U326*V263 + C5*DW126 - U316*V163  # DG4XY6
+    D[46, 3] = U216*V163 + DW316*V263 - C5*U236  # DG4XZ6
+    D[47, 3] = DW236*V163 + C5*U136 - U126*V263  # DG4YZ6
+    D[48, 3] = DV236*V163 + C5*WP36 - DV136V263  # DG4ZZ6
+    D[49, 3] = VP25*V263 + C5*VP26               # DG4MX6
+    D[50, 3] = -VP25*V163 - C5*VP16              # DG4MY6
+    # Joint 5
+    D[33, 4] = -DV125              # DG5XX5
+    D[34, 4] = DW125               # DG5XY5
+    D[35, 4] = -U235               # DG5XZ5
+    D[36, 4] = U135                # DG5YZ5
+    D[37, 4] = WP35                # DG5ZZ5
+    D[38, 4] = VP25                # DG5MX5
+    D[39, 4] = -VP15               # DG5MY5
+    D[40, 4] = QDP5                # DG5Ia5
+    D[41, 4] = QP5                 # DG5FV5
+    D[42, 4] = np.sign(QP5)        # DG5FS5
+    D[44, 4] = S6*WP16 + C6DV136   # DG5XX6
+    D[45, 4] = C6*U326 - S6*U316   # DG5XY6
+    D[46, 4] = S6*U216 + C6*DW316  # DG5XZ6
+    D[47, 4] = S6*DW236 - C6*U126  # DG5YZ6
+    D[48, 4] = S6*DV236 - C6DV136  # DG5ZZ6
+    D[49, 4] = C6*VP25             # DG5MX6
+    D[50, 4] = -S6*VP25            # DG5MY6
+    # Joint 6
+    D[44, 5] = -DV126        # DG6XX6
+    D[45, 5] = DW126         # DG6XY6
+    D[46, 5] = -U236         # DG6XZ6
+    D[47, 5] = U136          # DG6YZ6
+    D[48, 5] = WP36          # DG6ZZ6
+    D[49, 5] = VP26          # DG6MX6
+    D[50, 5] = -VP16         # DG6MY6
+    D[51, 5] = QDP6          # DG6Ia6
+    D[52, 5] = QP6           # DG6FV6
+    D[53, 5] = np.sign(QP6)  # DG6FS6
+
+
+def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL1, RL2, g):
+    """Fill GAM, shape (6, N). q, qd, qdd: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    QP1, QP2, QP3, QP4, QP5, QP6 = qd
+    QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
+    (
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2, MY2, FV2, FS2, OFFSET2, MX3, MY3, MZ3R, M3R, Ia3,
+        FV3, FS3, OFFSET3, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5,
+        MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6
+    ) = X
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 1
+    DV331 = QP1**2
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    DV232 = QP2*W22
+    WP12 = DV232 - S2*QDP1
+    DV132 = QP2*W12
+    WP22 = -C2*QDP1 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U122 = DV122 - QDP2
+    U132 = DV132 + WP22
+    U212 = QDP2 + DV122
+    U222 = -DV112 - DV332
+    U232 = DV232 - WP12
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    U332 = -DV112 - DV222
+    VSP12 = -RL2*QDP1
+    VSP22 = -RL2*DV331
+    VP12 = C2*VSP12 - g*S2
+    VP22 = -g*C2 - S2*VSP12
+    # Link 3
+    VSP13 = VP12 - q3*U122
+    VSP23 = VP22 - q3*U222
+    VSP33 = VSP22 - q3*U322
+    QP3x2 = 2*QP3
+    VP13 = VSP13 + QP2*QP3x2
+    VP23 = VSP33 - W12*QP3x2
+    VP33 = QDP3 - VSP23
+    # Link 4
+    W14 = C4*W12 + S4*QP2
+    W24 = C4*QP2 - S4*W12
+    W34 = QP4 - W22
+    WP14 = C4*WP12 + S4*QDP2 + QP4*W24
+    WP24 = C4*QDP2 - S4*WP12 - QP4*W14
+    WP34 = QDP4 - WP22
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = DV124 - WP34
+    U134 = WP24 + DV134
+    U214 = WP34 + DV124
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VP14 = C4*VP13 + S4*VP23
+    VP24 = C4*VP23 - S4*VP13
+    # Link 5
+    W15 = C5*W14 - S5*W34
+    W25 = -C5*W34 - S5*W14
+    W35 = QP5 + W24
+    WP15 = C5*WP14 + QP5*W25 - S5*WP34
+    WP25 = -C5*WP34 - S5*WP14 - QP5*W15
+    WP35 = QDP5 + WP24
+    DV115 = W15**2
+    DV125 = W15*W25
+    DV135 = W15*W35
+    DV225 = W25**2
+    DV235 = W25*W35
+    DV335 = W35**2
+    DW235 = DV225 - DV335
+    DW315 = DV335 - DV115
+    DW125 = DV115 - DV225
+    U115 = -DV225 - DV335
+    U125 = DV125 - WP35
+    U135 = WP25 + DV135
+    U215 = WP35 + DV125
+    U225 = -DV115 - DV335
+    U235 = DV235 - WP15
+    U315 = DV135 - WP25
+    U325 = WP15 + DV235
+    VP15 = C5*VP14 - S5*VP33
+    VP25 = -C5*VP33 - S5*VP14
+    # Link 6
+    W16 = C6*W15 + S6*W35
+    W26 = C6*W35 - S6*W15
+    W36 = QP6 - W25
+    WP16 = C6*WP15 + S6*WP35 + QP6*W26
+    WP26 = C6*WP35 - S6*WP15 - QP6*W16
+    WP36 = QDP6 - WP25
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV136 = W16*W36
+    DV226 = W26**2
+    DV236 = W26*W36
+    DV336 = W36**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = DV126 - WP36
+    U136 = WP26 + DV136
+    U216 = WP36 + DV126
+    U226 = -DV116 - DV336
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = WP16 + DV236
+    VP16 = C6*VP15 + S6*VP24
+    VP26 = C6*VP24 - S6*VP15
+    # Joint 6
+    F16 = MX6*U116 + MY6*U126
+    F26 = MX6*U216 + MY6*U226
+    F36 = MX6*U316 + MY6*U326
+    N16 = XX6R*WP16 + ZZ6*DV236 + YZ6*DW236 + XZ6*U216 - XY6*U316 - MY6*VP25
+    N26 = (XX6R - ZZ6)*DV136 + XZ6*DW316 + XY6*U326 + MX6*VP25 - YZ6*U126
+    N36 = ZZ6*WP36 + XY6*DW126 + YZ6*U136 + MX6*VP26 - XX6R*DV126 - XZ6*U236 - MY6*VP16
+    FDI16 = C6*F16 - S6*F26
+    FDI36 = S6*F16 + C6*F26
+    # Joint 5
+    F15 = MX5*U115 + MY5R*U125
+    F25 = MX5*U215 + MY5R*U225
+    F35 = MX5*U315 + MY5R*U325
+    E15 = FDI16 + F15
+    E25 = F25 - F36
+    E35 = FDI36 + F35
+    N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VP24 - XY5*U315
+    N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VP24
+    N35 = ZZ5R*WP35 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
+    NE15 = C6*N16 + N15 - S6*N26
+    NE25 = N25 - N36
+    NE35 = S6*N16 + C6*N26 + N35
+    FDI15 = C5*E15 - S5*E25
+    FDI35 = -S5*E15 - C5*E25
+    # Joint 4
+    F14 = MX4*U114 + MY4R*U124
+    F24 = MX4*U214 + MY4R*U224
+    F34 = MX4*U314 + MY4R*U324
+    E14 = FDI15 + F14
+    E24 = E35 + F24
+    E34 = FDI35 + F34
+    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 + MY4R*VP33 - XY4*U314
+    N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4*U324 - YZ4*U124 - MX4*VP33
+    N34 = ZZ4R*WP34 + XY4*DW124 + YZ4*U134 + MX4*VP24 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
+    NE14 = C5*NE15 + N14 - S5*NE25
+    NE24 = NE35 + N24
+    NE34 = N34 - S5*NE15 - C5*NE25
+    FDI14 = C4*E14 - S4*E24
+    FDI24 = S4*E14 + C4*E24
+    # Joint 3
+    F13 = M3R*VP13 + MX3*U112 + MY3*U132 - MZ3R*U122
+    F23 = M3R*VP23 + MX3*U312 + MY3*U332 - MZ3R*U322
+    F33 = M3R*VP33 + MZ3R*U222 - MX3*U212 - MY3*U232
+    E13 = FDI14 + F13
+    E23 = FDI24 + F23
+    E33 = E34 + F33
+    N13 = MY3*VP33 - MZ3R*VP23
+    N23 = MZ3R*VP13 - MX3*VP33
+    N33 = MX3*VP23 - MY3*VP13
+    NE13 = C4*NE14 + N13 - S4*NE24
+    NE23 = S4*NE14 + C4*NE24 + N23
+    NE33 = NE34 + N33
+    # Joint 2
+    F12 = MX2*U112 + MY2*U122
+    F22 = MX2*U212 + MY2*U222
+    E12 = E13 + F12
+    E22 = F22 - E33
+    N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*U212 + MY2*VSP22 - XY2R*U312
+    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*U122 - MX2*VSP22
+    N32 = ZZ2R*QDP2 + XY2R*DW122 + YZ2R*U132 + MX2*VP22 - XX2R*DV122 - XZ2R*U232 - MY2*VP12
+    NE12 = NE13 + N12 - q3*E23
+    NE22 = N22 - NE33
+    NE32 = NE23 + q3*E13 + N32
+    FDI12 = C2*E12 - S2*E22
+    # Joint 1
+    N31 = ZZ1R*QDP1
+    NE31 = N31 - S2*NE12 - C2*NE22 - RL2*FDI12
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
+    GAM[2] = OFFSET3 + E33 + Ia3*QDP3 + FV3*QP3 + FS3*np.sign(QP3)
+    GAM[3] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*np.sign(QP4)
+    GAM[4] = OFFSET5 + NE35 + Ia5*QDP5 + FV5*QP5 + FS5*np.sign(QP5)
+    GAM[5] = OFFSET6 + N36 + Ia6*QDP6 + FV6*QP6 + FS6*np.sign(QP6)
+
+
+def _inertia_matrix_block(q, A, X, RL1, RL2, g):
+    """Fill A, shape (6, 6, N): column i is Gamma for a unit acceleration of joint i from rest. q: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    ZZ1R = X[0]
+    XX2R = X[4]
+    XY2R = X[5]
+    XZ2R = X[6]
+    YZ2R = X[7]
+    ZZ2R = X[8]
+    MX2 = X[9]
+    MY2 = X[10]
+    MX3 = X[14]
+    MY3 = X[15]
+    MZ3R = X[16]
+    M3R = X[17]
+    Ia3 = X[18]
+    XX4R = X[22]
+    XY4 = X[23]
+    XZ4 = X[24]
+    YZ4 = X[25]
+    ZZ4R = X[26]
+    MX4 = X[27]
+    MY4R = X[28]
+    Ia4 = X[29]
+    XX5R = X[33]
+    XY5 = X[34]
+    XZ5 = X[35]
+    YZ5 = X[36]
+    ZZ5R = X[37]
+    MX5 = X[38]
+    MY5R = X[39]
+    Ia5 = X[40]
+    XX6R = X[44]
+    XY6 = X[45]
+    XZ6 = X[46]
+    YZ6 = X[47]
+    ZZ6 = X[48]
+    MX6 = X[49]
+    MY6 = X[50]
+    Ia6 = X[51]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 2
+    VP121 = -RL2*C2
+    VP221 = RL2*S2
+    # Link 3
+    VSP331 = S2*q3
+    # Link 4
+    WP141 = -S2*C4
+    WP241 = S2*S4
+    VP141 = C4*VP121 + S4*VSP331
+    VP241 = C4*VSP331 - S4*VP121
+    # Link 5
+    WP151 = C5*WP141 - C2*S5
+    WP251 = -C2*C5 - S5*WP141
+    VP151 = C5*VP141 + S5*VP221
+    VP251 = C5*VP221 - S5*VP141
+    # Link 6
+    WP161 = C6*WP151 + S6*WP241
+    WP261 = C6*WP241 - S6*WP151
+    VP161 = C6*VP151 + S6*VP241
+    VP261 = C6*VP241 - S6*VP151
+    # Joint 6
+    F161 = MY6*WP251
+    F261 = -MX6*WP251
+    F361 = MY6*WP161 - MX6*WP261
+    N161 = XX6R*WP161 + XY6*WP261 - XZ6*WP251 - MY6*VP251
+    N261 = XY6*WP161 + MX6*VP251 - YZ6*WP251
+    N361 = YZ6*WP261 + XZ6*WP161 + MX6*VP261 - ZZ6*WP251 - MY6*VP161
+    FDI161 = C6*F161 - S6*F261
+    FDI361 = S6*F161 + C6*F261
+    # Joint 5
+    F151 = -MY5R*WP241
+    F251 = MX5*WP241
+    F351 = MY5R*WP151 - MX5*WP251
+    E151 = FDI161 + F151
+    E251 = F251 - F361
+    E351 = FDI361 + F351
+    N151 = XX5R*WP151 + XZ5*WP241 + XY5*WP251 + MY5R*VP241
+    N251 = XY5*WP151 + YZ5*WP241 - MX5*VP241
+    N351 = ZZ5R*WP241 + YZ5*WP251 + XZ5*WP151 + MX5*VP251 - MY5R*VP151
+    NE151 = C6*N161 + N151 - S6*N261
+    NE251 = N251 - N361
+    NE351 = S6*N161 + C6*N261 + N351
+    FDI151 = C5*E151 - S5*E251
+    FDI351 = -S5*E151 - C5*E251
+    # Joint 4
+    F141 = -MY4R*C2
+    F241 = MX4*C2
+    F341 = MY4R*WP141 - MX4*WP241
+    E141 = FDI151 + F141
+    E241 = E351 + F241
+    E341 = FDI351 + F341
+    N141 = XX4R*WP141 + XZ4*C2 + XY4*WP241 - MY4R*VP221
+    N241 = XY4*WP141 + YZ4*C2 + MX4*VP221
+    N341 = ZZ4R*C2 + YZ4*WP241 + XZ4*WP141 + MX4*VP241 - MY4R*VP141
+    NE141 = C5*NE151 + N141 - S5*NE251
+    NE241 = NE351 + N241
+    NE341 = N341 - S5*NE151 - C5*NE251
+    FDI141 = C4*E141 - S4*E241
+    FDI241 = S4*E141 + C4*E241
+    # Joint 3
+    F131 = M3R*VP121 - MY3*C2
+    F231 = M3R*VSP331 + MX3*C2 + MZ3R*S2
+    F331 = -M3R*VP221 - MY3*S2
+    E131 = FDI141 + F131
+    E231 = FDI241 + F231
+    E331 = E341 + F331
+    N131 = -MY3*VP221 - MZ3R*VSP331
+    N231 = MZ3R*VP121 + MX3*VP221
+    N331 = MX3*VSP331 - MY3*VP121
+    NE131 = C4*NE141 + N131 - S4*NE241
+    NE231 = S4*NE141 + C4*NE241 + N231
+    NE331 = NE341 + N331
+    # Joint 2
+    N121 = -XX2R*S2 - XY2R*C2
+    N221 = -XY2R*S2
+    N321 = MX2*VP221 - YZ2R*C2 - XZ2R*S2 - MY2*VP121
+    NE121 = NE131 + N121 - q3*E231
+    NE221 = N221 - NE331
+    NE321 = NE231 + q3*E131 + N321
+    FDI121 = C2*E131 + S2*E331
+    # Joint 1
+    NE311 = ZZ1R - S2*NE121 - C2*NE221 - RL2*FDI121
+    # Link 4
+    VP142 = q3*C4
+    VP242 = -q3*S4
+    # Link 5
+    WP152 = S4*C5
+    WP252 = -S4*S5
+    VP152 = C5*VP142
+    VP252 = -S5*VP142
+    # Link 6
+    WP162 = C6*WP152 + C4*S6
+    WP262 = C4*C6 - S6*WP152
+    VP162 = C6*VP152 + S6*VP242
+    VP262 = C6*VP242 - S6*VP152
+    # Joint 6
+    F162 = MY6*WP252
+    F262 = -MX6*WP252
+    F362 = MY6*WP162 - MX6*WP262
+    N162 = XX6R*WP162 + XY6*WP262 - XZ6*WP252 - MY6*VP252
+    N262 = XY6*WP162 + MX6*VP252 - YZ6*WP252
+    N362 = YZ6*WP262 + XZ6*WP162 + MX6*VP262 - ZZ6*WP252 - MY6*VP162
+    FDI162 = C6*F162 - S6*F262
+    FDI362 = S6*F162 + C6*F262
+    # Joint 5
+    F152 = -MY5R*C4
+    F252 = MX5*C4
+    F352 = MY5R*WP152 - MX5*WP252
+    E152 = FDI162 + F152
+    E252 = F252 - F362
+    E352 = FDI362 + F352
+    N152 = XX5R*WP152 + XZ5*C4 + XY5*WP252 + MY5R*VP242
+    N252 = XY5*WP152 + YZ5*C4 - MX5*VP242
+    N352 = ZZ5R*C4 + YZ5*WP252 + XZ5*WP152 + MX5*VP252 - MY5R*VP152
+    NE152 = C6*N162 + N152 - S6*N262
+    NE252 = N252 - N362
+    NE352 = S6*N162 + C6*N262 + N352
+    FDI152 = C5*E152 - S5*E252
+    FDI352 = -S5*E152 - C5*E252
+    # Joint 4
+    F342 = MY4R*S4 - MX4*C4
+    E342 = FDI352 + F342
+    N142 = XX4R*S4 + XY4*C4
+    N242 = XY4*S4
+    N342 = YZ4*C4 + XZ4*S4 + MX4*VP242 - MY4R*VP142
+    NE142 = C5*NE152 + N142 - S5*NE252
+    NE242 = NE352 + N242
+    NE342 = N342 - S5*NE152 - C5*NE252
+    FDI142 = C4*FDI152 - S4*E352
+    # Joint 3
+    F132 = MZ3R + M3R*q3
+    E132 = FDI142 + F132
+    E332 = E342 - MX3
+    N232 = MZ3R*q3
+    NE232 = S4*NE142 + C4*NE242 + N232
+    # Joint 2
+    NE322 = ZZ2R + NE232 + q3*E132
+    # Link 6
+    VP163 = -S5*C6
+    VP263 = S5*S6
+    # Joint 6
+    N163 = MY6*C5
+    N263 = -MX6*C5
+    N363 = MX6*VP263 - MY6*VP163
+    NE153 = C6*N163 - S6*N263
+    FDI364 = -S6*N163 - C6*N263
+    # Joint 5
+    N353 = MY5R*S5 - MX5*C5
+    NE353 = N353 - FDI364
+    NE343 = C5*N363 - S5*NE153
+    # Joint 6
+    N164 = XX6R*VP163 + XZ6*C5 + XY6*VP263
+    N264 = XY6*VP163 + YZ6*C5
+    N364 = ZZ6*C5 + YZ6*VP263 + XZ6*VP163
+    # Joint 5
+    N154 = -XX5R*S5 - XY5*C5
+    N254 = -XY5*S5
+    N354 = -YZ5*C5 - XZ5*S5
+    NE154 = C6*N164 + N154 - S6*N264
+    NE254 = N254 - N364
+    NE354 = S6*N164 + C6*N264 + N354
+    # Joint 4
+    NE344 = ZZ4R - S5*NE154 - C5*NE254
+    # Joint 6
+    N165 = XX6R*S6 + XY6*C6
+    N265 = XY6*S6
+    N365 = YZ6*C6 + XZ6*S6
+    # Joint 5
+    NE355 = ZZ5R + S6*N165 + C6*N265
+    # Inertia matrix
+    A[0, 0] = NE311
+    A[1, 0] = A[0, 1] = NE321
+    A[2, 0] = A[0, 2] = E331
+    A[3, 0] = A[0, 3] = NE341
+    A[4, 0] = A[0, 4] = NE351
+    A[5, 0] = A[0, 5] = N361
+    A[1, 1] = NE322
+    A[2, 1] = A[1, 2] = E332
+    A[3, 1] = A[1, 3] = NE342
+    A[4, 1] = A[1, 4] = NE352
+    A[5, 1] = A[1, 5] = N362
+    A[2, 2] = M3R + Ia3
+    A[3, 2] = A[2, 3] = NE343
+    A[4, 2] = A[2, 4] = NE353
+    A[5, 2] = A[2, 5] = N363
+    A[3, 3] = Ia4 + NE344
+    A[4, 3] = A[3, 4] = NE354
+    A[5, 3] = A[3, 5] = N364
+    A[4, 4] = Ia5 + NE355
+    A[5, 4] = A[4, 5] = N365
+    A[5, 5] = ZZ6 + Ia6
+
+
+def _bias_block(q, qd, GAM, X, RL1, RL2, g):
+    """Fill GAM, shape (6, N), for qdd = 0. q, qd: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    QP1, QP2, QP3, QP4, QP5, QP6 = qd
+    FV1 = X[1]
+    FS1 = X[2]
+    OFFSET1 = X[3]
+    XX2R = X[4]
+    XY2R = X[5]
+    XZ2R = X[6]
+    YZ2R = X[7]
+    ZZ2R = X[8]
+    MX2 = X[9]
+    MY2 = X[10]
+    FV2 = X[11]
+    FS2 = X[12]
+    OFFSET2 = X[13]
+    MX3 = X[14]
+    MY3 = X[15]
+    MZ3R = X[16]
+    M3R = X[17]
+    FV3 = X[19]
+    FS3 = X[20]
+    OFFSET3 = X[21]
+    XX4R = X[22]
+    XY4 = X[23]
+    XZ4 = X[24]
+    YZ4 = X[25]
+    ZZ4R = X[26]
+    MX4 = X[27]
+    MY4R = X[28]
+    FV4 = X[30]
+    FS4 = X[31]
+    OFFSET4 = X[32]
+    XX5R = X[33]
+    XY5 = X[34]
+    XZ5 = X[35]
+    YZ5 = X[36]
+    ZZ5R = X[37]
+    MX5 = X[38]
+    MY5R = X[39]
+    FV5 = X[41]
+    FS5 = X[42]
+    OFFSET5 = X[43]
+    XX6R = X[44]
+    XY6 = X[45]
+    XZ6 = X[46]
+    YZ6 = X[47]
+    ZZ6 = X[48]
+    MX6 = X[49]
+    MY6 = X[50]
+    FV6 = X[52]
+    FS6 = X[53]
+    OFFSET6 = X[54]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 1
+    DV331 = QP1**2
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    WP12 = QP2*W22
+    WP22 = -QP2*W12
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U222 = -DV112 - DV332
+    U312 = -2*WP22
+    U322 = 2*WP12
+    U332 = -DV112 - DV222
+    VSP22 = -RL2*DV331
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 3
+    VSP13 = VP12 - q3*DV122
+    VSP23 = VP22 - q3*U222
+    VSP33 = VSP22 - q3*U322
+    QP3x2 = 2*QP3
+    VP13 = VSP13 + QP2*QP3x2
+    VP23 = VSP33 - W12*QP3x2
+    # Link 4
+    W14 = C4*W12 + S4*QP2
+    W24 = C4*QP2 - S4*W12
+    W34 = QP4 - W22
+    WP14 = C4*WP12 + QP4*W24
+    WP24 = -S4*WP12 - QP4*W14
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = WP22 + DV124
+    U134 = WP24 + DV134
+    U214 = DV124 - WP22
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VP14 = C4*VP13 + S4*VP23
+    VP24 = C4*VP23 - S4*VP13
+    # Link 5
+    W15 = C5*W14 - S5*W34
+    W25 = -C5*W34 - S5*W14
+    W35 = QP5 + W24
+    WP15 = C5*WP14 + S5*WP22 + QP5*W25
+    WP25 = C5*WP22 - S5*WP14 - QP5*W15
+    DV115 = W15**2
+    DV125 = W15*W25
+    DV135 = W15*W35
+    DV225 = W25**2
+    DV235 = W25*W35
+    DV335 = W35**2
+    DW235 = DV225 - DV335
+    DW315 = DV335 - DV115
+    DW125 = DV115 - DV225
+    U115 = -DV225 - DV335
+    U125 = DV125 - WP24
+    U135 = WP25 + DV135
+    U215 = WP24 + DV125
+    U225 = -DV115 - DV335
+    U235 = DV235 - WP15
+    U315 = DV135 - WP25
+    U325 = WP15 + DV235
+    VP15 = C5*VP14 + S5*VSP23
+    VP25 = C5*VSP23 - S5*VP14
+    # Link 6
+    W16 = C6*W15 + S6*W35
+    W26 = C6*W35 - S6*W15
+    W36 = QP6 - W25
+    WP16 = C6*WP15 + S6*WP24 + QP6*W26
+    WP26 = C6*WP24 - S6*WP15 - QP6*W16
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV136 = W16*W36
+    DV226 = W26**2
+    DV236 = W26*W36
+    DV336 = W36**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = WP25 + DV126
+    U136 = WP26 + DV136
+    U216 = DV126 - WP25
+    U226 = -DV116 - DV336
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = WP16 + DV236
+    VP16 = C6*VP15 + S6*VP24
+    VP26 = C6*VP24 - S6*VP15
+    # Joint 6
+    F16 = MX6*U116 + MY6*U126
+    F26 = MX6*U216 + MY6*U226
+    F36 = MX6*U316 + MY6*U326
+    N16 = XX6R*WP16 + ZZ6*DV236 + YZ6*DW236 + XZ6*U216 - XY6*U316 - MY6*VP25
+    N26 = (XX6R - ZZ6)*DV136 + XZ6*DW316 + XY6*U326 + MX6*VP25 - YZ6*U126
+    N36 = XY6*DW126 + YZ6*U136 + MX6*VP26 - ZZ6*WP25 - XX6R*DV126 - XZ6*U236 - MY6*VP16
+    FDI16 = C6*F16 - S6*F26
+    FDI36 = S6*F16 + C6*F26
+    # Joint 5
+    F15 = MX5*U115 + MY5R*U125
+    F25 = MX5*U215 + MY5R*U225
+    F35 = MX5*U315 + MY5R*U325
+    E15 = FDI16 + F15
+    E25 = F25 - F36
+    E35 = FDI36 + F35
+    N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VP24 - XY5*U315
+    N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VP24
+    N35 = ZZ5R*WP24 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
+    NE15 = C6*N16 + N15 - S6*N26
+    NE25 = N25 - N36
+    NE35 = S6*N16 + C6*N26 + N35
+    FDI15 = C5*E15 - S5*E25
+    FDI35 = -S5*E15 - C5*E25
+    # Joint 4
+    F14 = MX4*U114 + MY4R*U124
+    F24 = MX4*U214 + MY4R*U224
+    F34 = MX4*U314 + MY4R*U324
+    E14 = FDI15 + F14
+    E24 = E35 + F24
+    E34 = FDI35 + F34
+    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4*U314 - MY4R*VSP23
+    N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4*U324 + MX4*VSP23 - YZ4*U124
+    N34 = XY4*DW124 + YZ4*U134 + MX4*VP24 - ZZ4R*WP22 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
+    NE14 = C5*NE15 + N14 - S5*NE25
+    NE24 = NE35 + N24
+    NE34 = N34 - S5*NE15 - C5*NE25
+    FDI14 = C4*E14 - S4*E24
+    FDI24 = S4*E14 + C4*E24
+    # Joint 3
+    F13 = M3R*VP13 + MX3*U112 - MZ3R*DV122
+    F23 = M3R*VP23 + MX3*U312 + MY3*U332 - MZ3R*U322
+    F33 = MZ3R*U222 - M3R*VSP23 - MX3*DV122
+    E13 = FDI14 + F13
+    E23 = FDI24 + F23
+    E33 = E34 + F33
+    N13 = -MY3*VSP23 - MZ3R*VP23
+    N23 = MZ3R*VP13 + MX3*VSP23
+    N33 = MX3*VP23 - MY3*VP13
+    NE13 = C4*NE14 + N13 - S4*NE24
+    NE23 = S4*NE14 + C4*NE24 + N23
+    NE33 = NE34 + N33
+    # Joint 2
+    F12 = MX2*U112 + MY2*DV122
+    F22 = MX2*DV122 + MY2*U222
+    E12 = E13 + F12
+    E22 = F22 - E33
+    N12 = XX2R*WP12 + ZZ2R*WP12 + YZ2R*DW232 + XZ2R*DV122 + MY2*VSP22 - XY2R*U312
+    N22 = XZ2R*DW312 + XY2R*U322 - (XX2R - ZZ2R)*WP22 - YZ2R*DV122 - MX2*VSP22
+    N32 = XY2R*DW122 + MX2*VP22 - XX2R*DV122 - MY2*VP12
+    NE12 = NE13 + N12 - q3*E23
+    NE22 = N22 - NE33
+    NE32 = NE23 + q3*E13 + N32
+    FDI12 = C2*E12 - S2*E22
+    NE31 = -S2*NE12 - C2*NE22 - RL2*FDI12
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
+    GAM[2] = OFFSET3 + E33 + FV3*QP3 + FS3*np.sign(QP3)
+    GAM[3] = OFFSET4 + NE34 + FV4*QP4 + FS4*np.sign(QP4)
+    GAM[4] = OFFSET5 + NE35 + FV5*QP5 + FS5*np.sign(QP5)
+    GAM[5] = OFFSET6 + N36 + FV6*QP6 + FS6*np.sign(QP6)
+
+
+def _gravity_block(q, GAM, X, RL1, RL2, g):
+    """Fill GAM, shape (6, N), at rest. q: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q5 = q[4]
+    q6 = q[5]
+    OFFSET1 = X[3]
+    MX2 = X[9]
+    MY2 = X[10]
+    OFFSET2 = X[13]
+    MX3 = X[14]
+    MY3 = X[15]
+    MZ3R = X[16]
+    M3R = X[17]
+    OFFSET3 = X[21]
+    MX4 = X[27]
+    MY4R = X[28]
+    OFFSET4 = X[32]
+    MX5 = X[38]
+    MY5R = X[39]
+    OFFSET5 = X[43]
+    MX6 = X[49]
+    MY6 = X[50]
+    OFFSET6 = X[54]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 2
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 4
+    VP14 = C4*VP12
+    VP24 = -S4*VP12
+    # Link 5
+    VP15 = C5*VP14 + S5*VP22
+    VP25 = C5*VP22 - S5*VP14
+    # Link 6
+    VP16 = C6*VP15 + S6*VP24
+    VP26 = C6*VP24 - S6*VP15
+    # Joint 6
+    N16 = -MY6*VP25
+    N26 = MX6*VP25
+    N36 = MX6*VP26 - MY6*VP16
+    # Joint 5
+    N15 = MY5R*VP24
+    N25 = -MX5*VP24
+    N35 = MX5*VP25 - MY5R*VP15
+    NE15 = C6*N16 + N15 - S6*N26
+    NE25 = N25 - N36
+    NE35 = S6*N16 + C6*N26 + N35
+    # Joint 4
+    N14 = -MY4R*VP22
+    N24 = MX4*VP22
+    N34 = MX4*VP24 - MY4R*VP14
+    NE14 = C5*NE15 + N14 - S5*NE25
+    NE24 = NE35 + N24
+    NE34 = N34 - S5*NE15 - C5*NE25
+    # Joint 3
+    F13 = M3R*VP12
+    F33 = -M3R*VP22
+    N13 = -MY3*VP22
+    N23 = MZ3R*VP12 + MX3*VP22
+    N33 = -MY3*VP12
+    NE13 = C4*NE14 + N13 - S4*NE24
+    NE23 = S4*NE14 + C4*NE24 + N23
+    NE33 = NE34 + N33
+    # Joint 2
+    N32 = MX2*VP22 - MY2*VP12
+    NE32 = NE23 + q3*F13 + N32
+    FDI12 = C2*F13 + S2*F33
+    NE31 = C2*NE33 - S2*NE13 - RL2*FDI12
+    # Torques
+    GAM[0] = OFFSET1 + NE31
+    GAM[1] = OFFSET2 + NE32
+    GAM[2] = OFFSET3 + F33
+    GAM[3] = OFFSET4 + NE34
+    GAM[4] = OFFSET5 + NE35
+    GAM[5] = OFFSET6 + N36
+
+
+def _frame_poses_block(q, T, RL1, RL2, g):
+    """Fill T, shape (6, 4, 4, N). q: (6, N)."""
+    # Inputs
+    q1, q2, q3, q4, q5, q6 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Frame 2
+    R112 = C1*C2
+    R122 = -C1*S2
+    R212 = S1*C2
+    R222 = -S1*S2
+    P12 = -RL2*S1
+    P22 = RL2*C1
+    # Frame 3
+    P13 = P12 - q3*R122
+    P23 = P22 - q3*R222
+    P33 = RL1 + C2*q3
+    # Frame 4
+    R114 = C4*R112 - S1*S4
+    R124 = -S1*C4 - S4*R112
+    R214 = C4*R212 + C1*S4
+    R224 = C1*C4 - S4*R212
+    R314 = -S2*C4
+    R324 = S2*S4
+    # Frame 5
+    R115 = C5*R114 + S5*R122
+    R125 = C5*R122 - S5*R114
+    R215 = C5*R214 + S5*R222
+    R225 = C5*R222 - S5*R214
+    R315 = C5*R314 - C2*S5
+    R325 = -C2*C5 - S5*R314
+    # Frame 6
+    R116 = C6*R115 + S6*R124
+    R126 = C6*R124 - S6*R115
+    R216 = C6*R215 + S6*R224
+    R226 = C6*R224 - S6*R215
+    R316 = C6*R315 + S6*R324
+    R326 = C6*R324 - S6*R315
+    # Poses
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 0, 2] = 0.0
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 1, 2] = 0.0
+    T[0, 2, 0] = 0.0
+    T[0, 2, 1] = 0.0
+    T[0, 2, 2] = 1.0
+    T[0, 0, 3] = 0.0
+    T[0, 1, 3] = 0.0
+    T[0, 2, 3] = RL1
+    T[1, 0, 0] = R112
+    T[1, 0, 1] = R122
+    T[1, 0, 2] = -S1
+    T[1, 1, 0] = R212
+    T[1, 1, 1] = R222
+    T[1, 1, 2] = C1
+    T[1, 2, 0] = -S2
+    T[1, 2, 1] = -C2
+    T[1, 2, 2] = 0.0
+    T[1, 0, 3] = P12
+    T[1, 1, 3] = P22
+    T[1, 2, 3] = RL1
+    T[2, 0, 0] = R112
+    T[2, 0, 1] = -S1
+    T[2, 0, 2] = -R122
+    T[2, 1, 0] = R212
+    T[2, 1, 1] = C1
+    T[2, 1, 2] = -R222
+    T[2, 2, 0] = -S2
+    T[2, 2, 1] = 0.0
+    T[2, 2, 2] = C2
+    T[2, 0, 3] = P13
+    T[2, 1, 3] = P23
+    T[2, 2, 3] = P33
+    T[3, 0, 0] = R114
+    T[3, 0, 1] = R124
+    T[3, 0, 2] = -R122
+    T[3, 1, 0] = R214
+    T[3, 1, 1] = R224
+    T[3, 1, 2] = -R222
+    T[3, 2, 0] = R314
+    T[3, 2, 1] = R324
+    T[3, 2, 2] = C2
+    T[3, 0, 3] = P13
+    T[3, 1, 3] = P23
+    T[3, 2, 3] = P33
+    T[4, 0, 0] = R115
+    T[4, 0, 1] = R125
+    T[4, 0, 2] = R124
+    T[4, 1, 0] = R215
+    T[4, 1, 1] = R225
+    T[4, 1, 2] = R224
+    T[4, 2, 0] = R315
+    T[4, 2, 1] = R325
+    T[4, 2, 2] = R324
+    T[4, 0, 3] = P13
+    T[4, 1, 3] = P23
+    T[4, 2, 3] = P33
+    T[5, 0, 0] = R116
+    T[5, 0, 1] = R126
+    T[5, 0, 2] = -R125
+    T[5, 1, 0] = R216
+    T[5, 1, 1] = R226
+    T[5, 1, 2] = -R225
+    T[5, 2, 0] = R316
+    T[5, 2, 1] = R326
+    T[5, 2, 2] = -R325
+    T[5, 0, 3] = P13
+    T[5, 1, 3] = P23
+    T[5, 2, 3] = P33

@@ -1,0 +1,1717 @@
+"""Tree of two branches, 7 joints, one of them prismatic, and a fixed tool: base parameters, regressor, dynamics.
+
+GENERATED from two_branch.yaml, sha256 22ecb3e74d7c, by symgen 0.1.0. Do not edit; symgen generate two_branch
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+    j  ant  sigma  gamma   b  alpha   d       theta         r
+    1    0      0      0   0      0   0          q1         0
+    2    1      0      0   0  -pi/2  D2          q2       RL2
+    3    2      1      0   0   pi/2   0        pi/2  q3 + 0.1
+    4    3      0      0   0  -pi/2  D4  -pi/2 + q4         0
+    5    4      2      0   0   pi/2  D5           0       RL5
+    6    1      0   pi/2  B6  -pi/2  D6          q6         0
+    7    6      0      0   0      0  D7          q7         0
+    8    7      0      0   0   pi/2   0          q8       RL8
+Gravity     acceleration (GX, 0, GZ) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1, q2, q3, q4, q6, q7, q8
+Element     FV      viscous: along q1, q2, q3, q4, q6, q7, q8
+Element     FS      coulomb: along q1, q2, q3, q4, q6, q7, q8
+Element     OFFSET  offset: along q1, q2, q3, q4, q6, q7, q8
+
+Base parameters, 67 of 108; Gautier and Khalil (1990), exact
+    ZZ1R = ZZ1 + Ia1 + YY2 + ZZ3 + YY4 + ZZ5 + YY6 + YY7 + 2*RL2*MZ2 + (D2**2 + RL2**2)*M2 + D4**2*M4 + 2*D5*MX5 +
+        (D4**2 + D5**2)*M5 + D6**2*M6 + (D6**2 + D7**2)*(M7 + M8)
+    MX1R = MX1 - MZ6 - MZ7 + D2*M2
+    MY1R = MY1 + MZ2 + RL2*M2 + D6*(M6 + M7 + M8)
+    XX2R = XX2 - YY2 + YY3 - ZZ3 - YY4 - ZZ5 - 2*D5*MX5 - D5**2*M5
+    XY2R = XY2 + YZ3
+    XZ2R = XZ2 - XY3 + D4*(MZ4 + MY5)
+    YZ2R = YZ2 - XZ3
+    ZZ2R = ZZ2 + Ia2 + XX3 + YY4 + ZZ5 + 2*D5*MX5 + D5**2*M5
+    MX3R = MX3 + D4*(M4 + M5)
+    MY3R = MY3 + MZ4 + MY5
+    M3R = M3 + M4 + M5
+    XX4R = XX4 - YY4 + XX5 - ZZ5 - 2*D5*MX5 + 2*RL5*MZ5 + (-D5**2 + RL5**2)*M5
+    XY4R = XY4 - XZ5 + RL5*MX5 + D5*MZ5 + D5*RL5*M5
+    XZ4R = XZ4 + XY5 - D5*MY5
+    YZ4R = YZ4 - YZ5 + RL5*MY5
+    ZZ4R = ZZ4 + YY5 + 2*D5*MX5 + 2*RL5*MZ5 + (D5**2 + RL5**2)*M5
+    MX4R = MX4 + MX5 + D5*M5
+    MY4R = MY4 - MZ5 - RL5*M5
+    XX6R = XX6 - YY6 - D7**2*(M7 + M8)
+    XZ6R = XZ6 - D7*MZ7
+    ZZ6R = ZZ6 + Ia6 + D7**2*(M7 + M8)
+    MX6R = MX6 + D7*(M7 + M8)
+    XX7R = XX7 - YY7 + YY8 + 2*RL8*MZ8 + RL8**2*M8
+    ZZ7R = ZZ7 + YY8 + 2*RL8*MZ8 + RL8**2*M8
+    MY7R = MY7 - MZ8 - RL8*M8
+    XX8R = XX8 - YY8
+    as they are: FV1 FS1 OFFSET1 MX2 MY2 FV2 FS2 OFFSET2 MZ3 Ia3 FV3 FS3 OFFSET3 Ia4 FV4 FS4 OFFSET4 XY6 YZ6 MY6 FV6 FS6
+        OFFSET6 XY7 XZ7 YZ7 MX7 Ia7 FV7 FS7 OFFSET7 XY8 XZ8 YZ8 ZZ8 MX8 MY8 Ia8 FV8 FS8 OFFSET8
+No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1
+
+Cost per sample
+    regressor         270 multiplications, 211 additions, 7 sin, 7 cos
+    inverse_dynamics  300 multiplications, 293 additions, 7 sin, 7 cos
+    inertia_matrix    172 multiplications, 132 additions, 6 sin, 6 cos
+    bias              275 multiplications, 240 additions, 7 sin, 7 cos
+    gravity           75 multiplications, 54 additions, 6 sin, 6 cos
+    frame_poses       55 multiplications, 28 additions, 6 sin, 6 cos
+"""
+
+import numpy as np
+
+SCHEMA = 1
+NAME = 'two_branch'
+SOURCE_SHA256 = '22ecb3e74d7cea543a89cfc7b8adb5a89961030eaeb428ac7c877cf91576ed1c'
+JOINTS = (1, 2, 3, 4, 6, 7, 8)
+CONSTANTS = {
+    'D2': 0.21, 'RL2': 0.13, 'D4': 0.17, 'D5': 0.06, 'RL5': 0.11, 'B6': 0.4, 'D6': -0.19, 'D7': 0.23, 'RL8': 0.29,
+    'GX': -4.905, 'GZ': -8.496,
+}
+BASE_PARAMETERS = (
+    'ZZ1R', 'MX1R', 'MY1R', 'FV1', 'FS1', 'OFFSET1', 'XX2R', 'XY2R', 'XZ2R', 'YZ2R', 'ZZ2R', 'MX2', 'MY2', 'FV2', 'FS2',
+    'OFFSET2', 'MX3R', 'MY3R', 'MZ3', 'M3R', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4R', 'XY4R', 'XZ4R', 'YZ4R', 'ZZ4R',
+    'MX4R', 'MY4R', 'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX6R', 'XY6', 'XZ6R', 'YZ6', 'ZZ6R', 'MX6R', 'MY6', 'FV6', 'FS6',
+    'OFFSET6', 'XX7R', 'XY7', 'XZ7', 'YZ7', 'ZZ7R', 'MX7', 'MY7R', 'Ia7', 'FV7', 'FS7', 'OFFSET7', 'XX8R', 'XY8', 'XZ8',
+    'YZ8', 'ZZ8', 'MX8', 'MY8', 'Ia8', 'FV8', 'FS8', 'OFFSET8',
+)
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
+    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4',
+    'MX4', 'MY4', 'MZ4', 'M4', 'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX5', 'XY5', 'XZ5', 'YY5', 'YZ5', 'ZZ5', 'MX5', 'MY5',
+    'MZ5', 'M5', 'XX6', 'XY6', 'XZ6', 'YY6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'MZ6', 'M6', 'Ia6', 'FV6', 'FS6', 'OFFSET6',
+    'XX7', 'XY7', 'XZ7', 'YY7', 'YZ7', 'ZZ7', 'MX7', 'MY7', 'MZ7', 'M7', 'Ia7', 'FV7', 'FS7', 'OFFSET7', 'XX8', 'XY8',
+    'XZ8', 'YY8', 'YZ8', 'ZZ8', 'MX8', 'MY8', 'MZ8', 'M8', 'Ia8', 'FV8', 'FS8', 'OFFSET8',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'MX1R': 'kg*m', 'MY1R': 'kg*m', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m',
+    'XX2R': 'kg*m**2', 'XY2R': 'kg*m**2', 'XZ2R': 'kg*m**2', 'YZ2R': 'kg*m**2', 'ZZ2R': 'kg*m**2', 'MX2': 'kg*m',
+    'MY2': 'kg*m', 'FV2': 'N*m*s/rad', 'FS2': 'N*m', 'OFFSET2': 'N*m', 'MX3R': 'kg*m', 'MY3R': 'kg*m', 'MZ3': 'kg*m',
+    'M3R': 'kg', 'Ia3': 'kg', 'FV3': 'N*s/m', 'FS3': 'N', 'OFFSET3': 'N', 'XX4R': 'kg*m**2', 'XY4R': 'kg*m**2',
+    'XZ4R': 'kg*m**2', 'YZ4R': 'kg*m**2', 'ZZ4R': 'kg*m**2', 'MX4R': 'kg*m', 'MY4R': 'kg*m', 'Ia4': 'kg*m**2',
+    'FV4': 'N*m*s/rad', 'FS4': 'N*m', 'OFFSET4': 'N*m', 'XX6R': 'kg*m**2', 'XY6': 'kg*m**2', 'XZ6R': 'kg*m**2',
+    'YZ6': 'kg*m**2', 'ZZ6R': 'kg*m**2', 'MX6R': 'kg*m', 'MY6': 'kg*m', 'FV6': 'N*m*s/rad', 'FS6': 'N*m',
+    'OFFSET6': 'N*m', 'XX7R': 'kg*m**2', 'XY7': 'kg*m**2', 'XZ7': 'kg*m**2', 'YZ7': 'kg*m**2', 'ZZ7R': 'kg*m**2',
+    'MX7': 'kg*m', 'MY7R': 'kg*m', 'Ia7': 'kg*m**2', 'FV7': 'N*m*s/rad', 'FS7': 'N*m', 'OFFSET7': 'N*m',
+    'XX8R': 'kg*m**2', 'XY8': 'kg*m**2', 'XZ8': 'kg*m**2', 'YZ8': 'kg*m**2', 'ZZ8': 'kg*m**2', 'MX8': 'kg*m',
+    'MY8': 'kg*m', 'Ia8': 'kg*m**2', 'FV8': 'N*m*s/rad', 'FS8': 'N*m', 'OFFSET8': 'N*m',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + YY2 + ZZ3 + YY4 + ZZ5 + YY6 + YY7 + 2*RL2*MZ2 + (D2**2 + RL2**2)*M2 + D4**2*M4 + 2*D5*MX5 + (D4**2 + D5**2)*M5 + D6**2*M6 + (D6**2 + D7**2)*(M7 + M8)',
+    'MX1R': 'MX1 - MZ6 - MZ7 + D2*M2', 'MY1R': 'MY1 + MZ2 + RL2*M2 + D6*(M6 + M7 + M8)', 'FV1': 'FV1', 'FS1': 'FS1',
+    'OFFSET1': 'OFFSET1', 'XX2R': 'XX2 - YY2 + YY3 - ZZ3 - YY4 - ZZ5 - 2*D5*MX5 - D5**2*M5', 'XY2R': 'XY2 + YZ3',
+    'XZ2R': 'XZ2 - XY3 + D4*(MZ4 + MY5)', 'YZ2R': 'YZ2 - XZ3',
+    'ZZ2R': 'ZZ2 + Ia2 + XX3 + YY4 + ZZ5 + 2*D5*MX5 + D5**2*M5', 'MX2': 'MX2', 'MY2': 'MY2', 'FV2': 'FV2', 'FS2': 'FS2',
+    'OFFSET2': 'OFFSET2', 'MX3R': 'MX3 + D4*(M4 + M5)', 'MY3R': 'MY3 + MZ4 + MY5', 'MZ3': 'MZ3', 'M3R': 'M3 + M4 + M5',
+    'Ia3': 'Ia3', 'FV3': 'FV3', 'FS3': 'FS3', 'OFFSET3': 'OFFSET3',
+    'XX4R': 'XX4 - YY4 + XX5 - ZZ5 - 2*D5*MX5 + 2*RL5*MZ5 + (-D5**2 + RL5**2)*M5',
+    'XY4R': 'XY4 - XZ5 + RL5*MX5 + D5*MZ5 + D5*RL5*M5', 'XZ4R': 'XZ4 + XY5 - D5*MY5', 'YZ4R': 'YZ4 - YZ5 + RL5*MY5',
+    'ZZ4R': 'ZZ4 + YY5 + 2*D5*MX5 + 2*RL5*MZ5 + (D5**2 + RL5**2)*M5', 'MX4R': 'MX4 + MX5 + D5*M5',
+    'MY4R': 'MY4 - MZ5 - RL5*M5', 'Ia4': 'Ia4', 'FV4': 'FV4', 'FS4': 'FS4', 'OFFSET4': 'OFFSET4',
+    'XX6R': 'XX6 - YY6 - D7**2*(M7 + M8)', 'XY6': 'XY6', 'XZ6R': 'XZ6 - D7*MZ7', 'YZ6': 'YZ6',
+    'ZZ6R': 'ZZ6 + Ia6 + D7**2*(M7 + M8)', 'MX6R': 'MX6 + D7*(M7 + M8)', 'MY6': 'MY6', 'FV6': 'FV6', 'FS6': 'FS6',
+    'OFFSET6': 'OFFSET6', 'XX7R': 'XX7 - YY7 + YY8 + 2*RL8*MZ8 + RL8**2*M8', 'XY7': 'XY7', 'XZ7': 'XZ7', 'YZ7': 'YZ7',
+    'ZZ7R': 'ZZ7 + YY8 + 2*RL8*MZ8 + RL8**2*M8', 'MX7': 'MX7', 'MY7R': 'MY7 - MZ8 - RL8*M8', 'Ia7': 'Ia7', 'FV7': 'FV7',
+    'FS7': 'FS7', 'OFFSET7': 'OFFSET7', 'XX8R': 'XX8 - YY8', 'XY8': 'XY8', 'XZ8': 'XZ8', 'YZ8': 'YZ8', 'ZZ8': 'ZZ8',
+    'MX8': 'MX8', 'MY8': 'MY8', 'Ia8': 'Ia8', 'FV8': 'FV8', 'FS8': 'FS8', 'OFFSET8': 'OFFSET8',
+}
+NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MZ1', 'M1')
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x......", "x......", "x......", "x......", "x......", "x......", "xx.....", "xx.....", "xx.....", "xx.....",
+    ".x.....", "xx.....", "xx.....", ".x.....", ".x.....", ".x.....", "xxx....", "xxx....", "xxx....", "xxx....",
+    "..x....", "..x....", "..x....", "..x....", "xx.x...", "xx.x...", "xx.x...", "xx.x...", "xx.x...", "xxxx...",
+    "xxxx...", "...x...", "...x...", "...x...", "...x...", "x...x..", "x...x..", "x...x..", "x...x..", "....x..",
+    "x...x..", "x...x..", "....x..", "....x..", "....x..", "x...xx.", "x...xx.", "x...xx.", "x...xx.", "....xx.",
+    "x...xx.", "x...xx.", ".....x.", ".....x.", ".....x.", ".....x.", "x...xxx", "x...xxx", "x...xxx", "x...xxx",
+    "x...xxx", "x...xxx", "x...xxx", "......x", "......x", "......x", "......x",
+)])
+DRIVES = None
+LIMITS = {}
+VALUES = {}
+_PATHS = {
+    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
+    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),))),
+    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
+    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
+    6: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),))), 7: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)), (7, 0, ((5, 1.0),))),
+    8: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((6, 1.0),))),
+}
+
+
+class Store(np.ndarray):
+    """Room for a regressor, made by `store`; views and copies of one are no stores."""
+
+    ready = False
+
+    def __array_finalize__(self, parent):
+        self.ready = False
+
+
+def store(N):
+    """Room for N samples, shape (67, 7, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
+    S = np.zeros((67, 7, N)).view(Store)
+    S[5, 0] = 1.0
+    S[15, 1] = 1.0
+    S[23, 2] = 1.0
+    S[34, 3] = 1.0
+    S[44, 4] = 1.0
+    S[55, 5] = 1.0
+    S[66, 6] = 1.0
+    S.ready = True
+    return S
+
+
+def _fill(block, result, states, *arguments):
+    """Run `block` over 4096 samples at a time; states (N, 7) enter as contiguous rows (7, B), result ends in samples."""
+    states = [np.asarray(x, dtype=float).reshape(-1, 7) for x in states]
+    N = len(states[0])
+    B = max(N, 1) if N <= 8192 else 4096
+    for t in range(0, N, B):
+        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+    return result
+
+
+def _filled_store(q, qd, qdd, out, *constants):
+    N = np.size(q) // 7
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (67, 7, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(67, 7, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
+
+
+def _by_sample(result, q):
+    """Samples first; for a single state (n,) without them."""
+    result = np.moveaxis(result, -1, 0)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def base_parameters(standard, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """X, shape (67,), from the 108 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
+        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5,
+        M5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7, MX7,
+        MY7, MZ7, M7, Ia7, FV7, FS7, OFFSET7, XX8, XY8, XZ8, YY8, YZ8, ZZ8, MX8, MY8, MZ8, M8, Ia8, FV8, FS8, OFFSET8
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + YY2 + ZZ3 + YY4 + ZZ5 + YY6 + YY7 + 2*RL2*MZ2 + (D2**2 + RL2**2)*M2 + D4**2*M4 + 2*D5*MX5 + (D4**2 + D5**2)*M5 + D6**2*M6 + (D6**2 + D7**2)*(M7 + M8)
+    MX1R = MX1 - MZ6 - MZ7 + D2*M2
+    MY1R = MY1 + MZ2 + RL2*M2 + D6*(M6 + M7 + M8)
+    XX2R = XX2 - YY2 + YY3 - ZZ3 - YY4 - ZZ5 - 2*D5*MX5 - D5**2*M5
+    XY2R = XY2 + YZ3
+    XZ2R = XZ2 - XY3 + D4*(MZ4 + MY5)
+    YZ2R = YZ2 - XZ3
+    ZZ2R = ZZ2 + Ia2 + XX3 + YY4 + ZZ5 + 2*D5*MX5 + D5**2*M5
+    MX3R = MX3 + D4*(M4 + M5)
+    MY3R = MY3 + MZ4 + MY5
+    M3R = M3 + M4 + M5
+    XX4R = XX4 - YY4 + XX5 - ZZ5 - 2*D5*MX5 + 2*RL5*MZ5 + (-D5**2 + RL5**2)*M5
+    XY4R = XY4 - XZ5 + RL5*MX5 + D5*MZ5 + D5*RL5*M5
+    XZ4R = XZ4 + XY5 - D5*MY5
+    YZ4R = YZ4 - YZ5 + RL5*MY5
+    ZZ4R = ZZ4 + YY5 + 2*D5*MX5 + 2*RL5*MZ5 + (D5**2 + RL5**2)*M5
+    MX4R = MX4 + MX5 + D5*M5
+    MY4R = MY4 - MZ5 - RL5*M5
+    XX6R = XX6 - YY6 - D7**2*(M7 + M8)
+    XZ6R = XZ6 - D7*MZ7
+    ZZ6R = ZZ6 + Ia6 + D7**2*(M7 + M8)
+    MX6R = MX6 + D7*(M7 + M8)
+    XX7R = XX7 - YY7 + YY8 + 2*RL8*MZ8 + RL8**2*M8
+    ZZ7R = ZZ7 + YY8 + 2*RL8*MZ8 + RL8**2*M8
+    MY7R = MY7 - MZ8 - RL8*M8
+    XX8R = XX8 - YY8
+    return np.array([
+        ZZ1R, MX1R, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2, MY2, FV2, FS2, OFFSET2, MX3R, MY3R, MZ3,
+        M3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4R, YZ4R, ZZ4R, MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX6R, XY6, XZ6R, YZ6,
+        ZZ6R, MX6R, MY6, FV6, FS6, OFFSET6, XX7R, XY7, XZ7, YZ7, ZZ7R, MX7, MY7R, Ia7, FV7, FS7, OFFSET7, XX8R, XY8, XZ8,
+        YZ8, ZZ8, MX8, MY8, Ia8, FV8, FS8, OFFSET8,
+    ])
+
+
+def regressor(q, qd, qdd, *, out=None, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """D of Gamma = D X, shape (N, 7, 67); q, qd, qdd of shape (N, 7) or (7,), rad or m and seconds.
+
+    A view on one store of shape (67, 7, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
+    faults, up to several times the arithmetic for large N.
+    """
+    S = _filled_store(q, qd, qdd, out, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ)
+    D = S.transpose(2, 1, 0)
+    return D[0] if np.ndim(q) == 1 else D
+
+
+def observation_matrix(q, qd, qdd, *, out=None, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """W of Y = W X + rho, shape (7*N, 67), Fortran order, rows joint-major: the same store, no copy."""
+    return _filled_store(q, qd, qdd, out, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ).reshape(67, -1).T
+
+
+def inverse_dynamics(q, qd, qdd, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """Joint torques Gamma, shape (N, 7), of base parameters X, shape (67,)."""
+    return _by_sample(_fill(_inverse_dynamics_block, np.empty((7, np.size(q) // 7)), (q, qd, qdd), X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+
+
+def inertia_matrix(q, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """A(q), shape (N, 7, 7), actuators included."""
+    return _by_sample(_fill(_inertia_matrix_block, np.empty((7, 7, np.size(q) // 7)), (q,), X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+
+
+def bias(q, qd, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """Gamma at qdd = 0, shape (N, 7): Coriolis, centrifugal, gravity, friction and offset."""
+    return _by_sample(_fill(_bias_block, np.empty((7, np.size(q) // 7)), (q, qd), X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+
+
+def gravity(q, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """Gamma at rest without friction, shape (N, 7): gravity, offset and springs (a base parameter may mix them)."""
+    return _by_sample(_fill(_gravity_block, np.empty((7, np.size(q) // 7)), (q,), X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+
+
+def forward_dynamics(q, qd, tau, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """qdd = A(q)**-1 (tau - bias), shape (N, 7)."""
+    A, H = inertia_matrix(q, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ), bias(q, qd, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ)
+    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """Homogeneous transform of every frame j in frame 0, shape (N, 8, 4, 4), at index j - 1."""
+    T = np.zeros((8, 4, 4, np.size(q) // 7))
+    T[:, 3, 3] = 1.0
+    return _by_sample(_fill(_frame_poses_block, T, (q,), D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+
+
+def jacobian(q, *, frame=8, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+    """J, shape (N, 6, 7): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ).reshape(-1, 8, 4, 4)
+    J = np.zeros((len(T), 6, 7))
+    P = T[:, (8 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[8 if frame is None else frame]:
+        z = T[:, j - 1, :3, 2]
+        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
+        for k, rate in rates:
+            J[:, :3, k] += rate * v
+            J[:, 3:, k] += rate * w
+    return J[0] if np.ndim(q) == 1 else J
+
+
+def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
+    """Fill D, shape (67, 7, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (7, N)."""
+    # Inputs
+    q1, q2, q3, q4, q6, q7, q8 = q
+    QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
+    QDP1, QDP2, QDP3, QDP4, QDP6, QDP7, QDP8 = qdd
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    th67 = q6 + q7
+    C67 = np.cos(th67)
+    S67 = np.sin(th67)
+    C8 = np.cos(q8)
+    S8 = np.sin(q8)
+    # Inputs
+    r3 = 0.1 + q3
+    # Link 1
+    DV331 = QP1**2
+    VP11 = -GX*C1
+    VP21 = GX*S1
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    U232 = S2*QDP1
+    U132 = -C2*QDP1
+    DV232 = QP2*W22
+    WP12 = DV232 - U232
+    DV132 = QP2*W12
+    WP22 = U132 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U122 = DV122 - QDP2
+    U212 = QDP2 + DV122
+    U222 = -DV112 - DV332
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    VSP12 = VP11 - D2*DV331 - RL2*QDP1
+    VSP22 = VP21 + D2*QDP1 - RL2*DV331
+    VP12 = C2*VSP12 + GZ*S2
+    VP22 = GZ*C2 - S2*VSP12
+    # Link 3
+    DF2MZ3 = -r3*U122
+    VSP13 = VP12 + DF2MZ3
+    VSP23 = VP22 - r3*U222
+    VSP33 = VSP22 - r3*U322
+    QP3x2 = 2*QP3
+    VP13 = VSP33 - W12*QP3x2
+    VP23 = -VSP13 - QP2*QP3x2
+    VP33 = QDP3 - VSP23
+    # Link 4
+    W14 = S4*QP2 - C4*W22
+    W24 = S4*W22 + C4*QP2
+    W34 = QP4 - W12
+    WP14 = S4*QDP2 + QP4*W24 - C4*WP22
+    WP24 = S4*WP22 + C4*QDP2 - QP4*W14
+    WP34 = QDP4 - WP12
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = DV124 - WP34
+    U134 = WP24 + DV134
+    U214 = WP34 + DV124
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VSP14 = VP13 - D4*DV331
+    VSP24 = VP23 - D4*U132
+    VSP34 = VP33 - D4*U232
+    VP14 = S4*VSP14 + C4*VSP34
+    VP24 = C4*VSP14 - S4*VSP34
+    # Link 6
+    W16 = -S6*QP1
+    W26 = -C6*QP1
+    U236 = S6*QDP1
+    U136 = -C6*QDP1
+    DV236 = QP6*W26
+    WP16 = DV236 - U236
+    DV136 = QP6*W16
+    WP26 = U136 - DV136
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV226 = W26**2
+    DV336 = QP6**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = DV126 - QDP6
+    U216 = QDP6 + DV126
+    U316 = DV136 - WP26
+    U326 = DV236 + WP16
+    VSP16 = VP11 - D6*QDP1
+    VSP26 = VP21 - D6*DV331
+    VP16 = C6*VSP26 + GZ*S6
+    VP26 = GZ*C6 - S6*VSP26
+    # Link 7
+    W37 = QP6 + QP7
+    WP37 = QDP6 + QDP7
+    W17 = -S67*QP1
+    W27 = -C67*QP1
+    U237 = S67*QDP1
+    U137 = -C67*QDP1
+    DV237 = W37*W27
+    WP17 = DV237 - U237
+    DV137 = W37*W17
+    WP27 = U137 - DV137
+    DV117 = W17**2
+    DV127 = W17*W27
+    DV227 = W27**2
+    DV337 = W37**2
+    DW237 = DV227 - DV337
+    DW317 = DV337 - DV117
+    DW127 = DV117 - DV227
+    U117 = -DV227 - DV337
+    U127 = DV127 - WP37
+    U217 = WP37 + DV127
+    U227 = -DV117 - DV337
+    U317 = DV137 - WP27
+    U327 = DV237 + WP17
+    VSP17 = VP16 + D7*U116
+    VSP27 = VP26 + D7*U216
+    VSP37 = D7*U316 - VSP16
+    VP17 = C7*VSP17 + S7*VSP27
+    VP27 = C7*VSP27 - S7*VSP17
+    # Link 8
+    W18 = C8*W17 + S8*W37
+    W28 = C8*W37 - S8*W17
+    W38 = QP8 - W27
+    WP18 = C8*WP17 + S8*WP37 + QP8*W28
+    WP28 = C8*WP37 - S8*WP17 - QP8*W18
+    WP38 = QDP8 - WP27
+    DV118 = W18**2
+    DV128 = W18*W28
+    DV138 = W18*W38
+    DV228 = W28**2
+    DV238 = W28*W38
+    DV338 = W38**2
+    DW238 = DV228 - DV338
+    DW318 = DV338 - DV118
+    DW128 = DV118 - DV228
+    U118 = -DV228 - DV338
+    U128 = DV128 - WP38
+    U138 = WP28 + DV138
+    U218 = WP38 + DV128
+    U228 = -DV118 - DV338
+    U238 = DV238 - WP18
+    U318 = DV138 - WP28
+    U328 = WP18 + DV238
+    VSP18 = VP17 - RL8*U127
+    VSP28 = VP27 - RL8*U227
+    VSP38 = VSP37 - RL8*U327
+    VP18 = C8*VSP18 + S8*VSP38
+    VP28 = C8*VSP38 - S8*VSP18
+    # Joint axes Z and velocities V seen from link 2
+    V121 = -RL2*C2
+    V221 = RL2*S2
+    # Joint axes Z and velocities V seen from link 3
+    V131 = D2 + S2*r3
+    # Joint axes Z and velocities V seen from link 4
+    Z141 = C2*C4
+    Z241 = -C2*S4
+    V341 = D4*C2 - V121
+    VS341 = -V221 - D4*S2
+    V141 = S4*V131 + C4*VS341
+    V241 = C4*V131 - S4*VS341
+    # Joint axes Z and velocities V seen from link 7
+    V371 = D6 + D7*C6
+    V176 = D7*S7
+    V276 = D7*C7
+    # Joint axes Z and velocities V seen from link 8
+    Z181 = -S67*C8
+    Z281 = S67*S8
+    VS381 = V371 + RL8*S67
+    V181 = S8*VS381
+    V281 = C8*VS381
+    VS186 = RL8 + V176
+    V186 = C8*VS186
+    V286 = -S8*VS186
+    V187 = RL8*C8
+    V287 = -RL8*S8
+    # Contributions that several joints share
+    U112V121 = U112*V121
+    U212V221 = U212*V221
+    U122V121 = U122*V121
+    U222V221 = U222*V221
+    DV134Z241 = DV134*Z241
+    C4DV134 = C4*DV134
+    S4U214 = S4*U214
+    C4U124 = C4*U124
+    DV138Z281 = DV138*Z281
+    C8DV138 = C8*DV138
+    DN6XX8 = S8*WP18 + C8DV138
+    DN6XY8 = C8*U328 - S8*U318
+    DN6XZ8 = S8*U218 + C8*DW318
+    DN6YZ8 = S8*DW238 - C8*U128
+    DN6ZZ8 = S8*DV238 - C8DV138
+    DN6MX8 = C8*VSP28
+    DN6MY8 = -S8*VSP28
+    # Joint 1
+    D[0, 0] = QDP1                                                    # DG1ZZ1
+    D[1, 0] = VP21                                                    # DG1MX1
+    D[2, 0] = -VP11                                                   # DG1MY1
+    D[3, 0] = QP1                                                     # DG1FV1
+    D[4, 0] = np.sign(QP1)                                            # DG1FS1
+    D[6, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
+    D[7, 0] = S2*U312 - C2*U322                                       # DG1XY2
+    D[8, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
+    D[9, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
+    D[11, 0] = C2*VSP22 + U112V121 + U212V221 + D2*U312               # DG1MX2
+    D[12, 0] = U122V121 + U222V221 + D2*U322 - S2*VSP22               # DG1MY2
+    D[16, 0] = C2*VP23 + U132*V121 + U232*V221 - S2*VP33 - DV331*V131  # DG1MX3
+    D[17, 0] = -C2*VP13 - U212V221 - U112V121 - U312*V131             # DG1MY3
+    D[18, 0] = S2*VP13 - U222V221 - U122V121 - U322*V131              # DG1MZ3
+    D[19, 0] = VP13*V131 - VP23*V121 - VP33*V221                      # DG1M3
+    D[24, 0] = WP14*Z141 + DV134Z241 - S2*DV124                       # DG1XX4
+    D[25, 0] = U324*Z241 + S2*DW124 - U314*Z141                       # DG1XY4
+    D[26, 0] = U214*Z141 + DW314*Z241 - S2*U234                       # DG1XZ4
+    D[27, 0] = DW234*Z141 + S2*U134 - U124*Z241                       # DG1YZ4
+    D[28, 0] = DV234*Z141 + S2*WP34 - DV134Z241                       # DG1ZZ4
+    D[29, 0] = S2*VP24 + U114*V141 + U214*V241 + U314*V341 - VSP24*Z241  # DG1MX4
+    D[30, 0] = VSP24*Z141 + U124*V141 + U224*V241 + U324*V341 - S2*VP14  # DG1MY4
+    D[35, 0] = -S6*WP16 - C6*DV136                                    # DG1XX6
+    D[36, 0] = S6*U316 - C6*U326                                      # DG1XY6
+    D[37, 0] = -S6*U216 - C6*DW316                                    # DG1XZ6
+    D[38, 0] = C6*U126 - S6*DW236                                     # DG1YZ6
+    D[40, 0] = D6*U316 - C6*VSP16                                     # DG1MX6
+    D[41, 0] = S6*VSP16 + D6*U326                                     # DG1MY6
+    D[45, 0] = -S67*WP17 - C67*DV137                                  # DG1XX7
+    D[46, 0] = S67*U317 - C67*U327                                    # DG1XY7
+    D[47, 0] = -S67*U217 - C67*DW317                                  # DG1XZ7
+    D[48, 0] = C67*U127 - S67*DW237                                   # DG1YZ7
+    D[50, 0] = C67*VSP37 + U317*V371                                  # DG1MX7
+    D[51, 0] = U327*V371 - S67*VSP37                                  # DG1MY7
+    D[56, 0] = WP18*Z181 + DV138Z281 - C67*DV128                      # DG1XX8
+    D[57, 0] = U328*Z281 + C67*DW128 - U318*Z181                      # DG1XY8
+    D[58, 0] = U218*Z181 + DW318*Z281 - C67*U238                      # DG1XZ8
+    D[59, 0] = DW238*Z181 + C67*U138 - U128*Z281                      # DG1YZ8
+    D[60, 0] = DV238*Z181 + C67*WP38 - DV138Z281                      # DG1ZZ8
+    D[61, 0] = VSP28*Z281 + C67*VP28 + U118*V181 + U218*V281          # DG1MX8
+    D[62, 0] = U128*V181 + U228*V281 - VSP28*Z181 - C67*VP18          # DG1MY8
+    # Joint 2
+    D[6, 1] = -DV122                # DG2XX2
+    D[7, 1] = DW122                 # DG2XY2
+    D[8, 1] = -U232                 # DG2XZ2
+    D[9, 1] = U132                  # DG2YZ2
+    D[10, 1] = QDP2                 # DG2ZZ2
+    D[11, 1] = VP22                 # DG2MX2
+    D[12, 1] = -VP12                # DG2MY2
+    D[13, 1] = QP2                  # DG2FV2
+    D[14, 1] = np.sign(QP2)         # DG2FS2
+    D[16, 1] = r3*U132              # DG2MX3
+    D[17, 1] = VP33 - r3*U112       # DG2MY3
+    D[18, 1] = DF2MZ3 - VP23        # DG2MZ3
+    D[19, 1] = -r3*VP23             # DG2M3
+    D[24, 1] = S4*WP14 + C4DV134    # DG2XX4
+    D[25, 1] = C4*U324 - S4*U314    # DG2XY4
+    D[26, 1] = S4U214 + C4*DW314    # DG2XZ4
+    D[27, 1] = S4*DW234 - C4U124    # DG2YZ4
+    D[28, 1] = S4*DV234 - C4DV134   # DG2ZZ4
+    D[29, 1] = -C4*VSP24 - r3*U314  # DG2MX4
+    D[30, 1] = S4*VSP24 - r3*U324   # DG2MY4
+    # Joint 3
+    D[16, 2] = -U232             # DG3MX3
+    D[17, 2] = U212              # DG3MY3
+    D[18, 2] = U222              # DG3MZ3
+    D[19, 2] = VP33              # DG3M3
+    D[20, 2] = QDP3              # DG3Ia3
+    D[21, 2] = QP3               # DG3FV3
+    D[22, 2] = np.sign(QP3)      # DG3FS3
+    D[29, 2] = C4*U114 - S4U214  # DG3MX4
+    D[30, 2] = C4U124 - S4*U224  # DG3MY4
+    # Joint 4
+    D[24, 3] = -DV124        # DG4XX4
+    D[25, 3] = DW124         # DG4XY4
+    D[26, 3] = -U234         # DG4XZ4
+    D[27, 3] = U134          # DG4YZ4
+    D[28, 3] = WP34          # DG4ZZ4
+    D[29, 3] = VP24          # DG4MX4
+    D[30, 3] = -VP14         # DG4MY4
+    D[31, 3] = QDP4          # DG4Ia4
+    D[32, 3] = QP4           # DG4FV4
+    D[33, 3] = np.sign(QP4)  # DG4FS4
+    # Joint 6
+    D[35, 4] = -DV126                                      # DG6XX6
+    D[36, 4] = DW126                                       # DG6XY6
+    D[37, 4] = -U236                                       # DG6XZ6
+    D[38, 4] = U136                                        # DG6YZ6
+    D[39, 4] = QDP6                                        # DG6ZZ6
+    D[40, 4] = VP26                                        # DG6MX6
+    D[41, 4] = -VP16                                       # DG6MY6
+    D[42, 4] = QP6                                         # DG6FV6
+    D[43, 4] = np.sign(QP6)                                # DG6FS6
+    D[45, 4] = -DV127                                      # DG6XX7
+    D[46, 4] = DW127                                       # DG6XY7
+    D[47, 4] = -U237                                       # DG6XZ7
+    D[48, 4] = U137                                        # DG6YZ7
+    D[49, 4] = WP37                                        # DG6ZZ7
+    D[50, 4] = VP27 + U117*V176 + U217*V276                # DG6MX7
+    D[51, 4] = U127*V176 + U227*V276 - VP17                # DG6MY7
+    D[56, 4] = DN6XX8                                      # DG6XX8
+    D[57, 4] = DN6XY8                                      # DG6XY8
+    D[58, 4] = DN6XZ8                                      # DG6XZ8
+    D[59, 4] = DN6YZ8                                      # DG6YZ8
+    D[60, 4] = DN6ZZ8                                      # DG6ZZ8
+    D[61, 4] = DN6MX8 + U118*V186 + U218*V286 - U318*V276  # DG6MX8
+    D[62, 4] = DN6MY8 + U128*V186 + U228*V286 - U328*V276  # DG6MY8
+    # Joint 7
+    D[45, 5] = -DV127                          # DG7XX7
+    D[46, 5] = DW127                           # DG7XY7
+    D[47, 5] = -U237                           # DG7XZ7
+    D[48, 5] = U137                            # DG7YZ7
+    D[49, 5] = WP37                            # DG7ZZ7
+    D[50, 5] = VP27                            # DG7MX7
+    D[51, 5] = -VP17                           # DG7MY7
+    D[52, 5] = QDP7                            # DG7Ia7
+    D[53, 5] = QP7                             # DG7FV7
+    D[54, 5] = np.sign(QP7)                    # DG7FS7
+    D[56, 5] = DN6XX8                          # DG7XX8
+    D[57, 5] = DN6XY8                          # DG7XY8
+    D[58, 5] = DN6XZ8                          # DG7XZ8
+    D[59, 5] = DN6YZ8                          # DG7YZ8
+    D[60, 5] = DN6ZZ8                          # DG7ZZ8
+    D[61, 5] = DN6MX8 + U118*V187 + U218*V287  # DG7MX8
+    D[62, 5] = DN6MY8 + U128*V187 + U228*V287  # DG7MY8
+    # Joint 8
+    D[56, 6] = -DV128        # DG8XX8
+    D[57, 6] = DW128         # DG8XY8
+    D[58, 6] = -U238         # DG8XZ8
+    D[59, 6] = U138          # DG8YZ8
+    D[60, 6] = WP38          # DG8ZZ8
+    D[61, 6] = VP28          # DG8MX8
+    D[62, 6] = -VP18         # DG8MY8
+    D[63, 6] = QDP8          # DG8Ia8
+    D[64, 6] = QP8           # DG8FV8
+    D[65, 6] = np.sign(QP8)  # DG8FS8
+
+
+def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
+    """Fill GAM, shape (7, N). q, qd, qdd: (7, N)."""
+    # Inputs
+    q1, q2, q3, q4, q6, q7, q8 = q
+    QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
+    QDP1, QDP2, QDP3, QDP4, QDP6, QDP7, QDP8 = qdd
+    (
+        ZZ1R, MX1R, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2, MY2, FV2, FS2, OFFSET2, MX3R, MY3R, MZ3,
+        M3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4R, YZ4R, ZZ4R, MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX6R, XY6, XZ6R,
+        YZ6, ZZ6R, MX6R, MY6, FV6, FS6, OFFSET6, XX7R, XY7, XZ7, YZ7, ZZ7R, MX7, MY7R, Ia7, FV7, FS7, OFFSET7, XX8R,
+        XY8, XZ8, YZ8, ZZ8, MX8, MY8, Ia8, FV8, FS8, OFFSET8
+    ) = X
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    th67 = q6 + q7
+    C67 = np.cos(th67)
+    S67 = np.sin(th67)
+    C8 = np.cos(q8)
+    S8 = np.sin(q8)
+    # Inputs
+    r3 = 0.1 + q3
+    # Link 1
+    DV331 = QP1**2
+    VP11 = -GX*C1
+    VP21 = GX*S1
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    DV232 = QP2*W22
+    WP12 = DV232 - S2*QDP1
+    DV132 = QP2*W12
+    WP22 = -C2*QDP1 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U122 = DV122 - QDP2
+    U132 = DV132 + WP22
+    U212 = QDP2 + DV122
+    U222 = -DV112 - DV332
+    U232 = DV232 - WP12
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    U332 = -DV112 - DV222
+    VSP12 = VP11 - D2*DV331 - RL2*QDP1
+    VSP22 = VP21 + D2*QDP1 - RL2*DV331
+    VP12 = C2*VSP12 + GZ*S2
+    VP22 = GZ*C2 - S2*VSP12
+    # Link 3
+    VSP13 = VP12 - r3*U122
+    VSP23 = VP22 - r3*U222
+    VSP33 = VSP22 - r3*U322
+    QP3x2 = 2*QP3
+    VP13 = VSP33 - W12*QP3x2
+    VP23 = -VSP13 - QP2*QP3x2
+    VP33 = QDP3 - VSP23
+    # Link 4
+    W14 = S4*QP2 - C4*W22
+    W24 = S4*W22 + C4*QP2
+    W34 = QP4 - W12
+    WP14 = S4*QDP2 + QP4*W24 - C4*WP22
+    WP24 = S4*WP22 + C4*QDP2 - QP4*W14
+    WP34 = QDP4 - WP12
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = DV124 - WP34
+    U134 = WP24 + DV134
+    U214 = WP34 + DV124
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VSP14 = VP13 + D4*U332
+    VSP24 = VP23 - D4*U132
+    VSP34 = VP33 - D4*U232
+    VP14 = S4*VSP14 + C4*VSP34
+    VP24 = C4*VSP14 - S4*VSP34
+    # Link 6
+    W16 = -S6*QP1
+    W26 = -C6*QP1
+    DV236 = QP6*W26
+    WP16 = DV236 - S6*QDP1
+    DV136 = QP6*W16
+    WP26 = -C6*QDP1 - DV136
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV226 = W26**2
+    DV336 = QP6**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = DV126 - QDP6
+    U136 = DV136 + WP26
+    U216 = QDP6 + DV126
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = DV236 + WP16
+    VSP16 = VP11 - D6*QDP1
+    VSP26 = VP21 - D6*DV331
+    VP16 = C6*VSP26 + GZ*S6
+    VP26 = GZ*C6 - S6*VSP26
+    # Link 7
+    W37 = QP6 + QP7
+    WP37 = QDP6 + QDP7
+    W17 = -S67*QP1
+    W27 = -C67*QP1
+    DV237 = W37*W27
+    WP17 = DV237 - S67*QDP1
+    DV137 = W37*W17
+    WP27 = -C67*QDP1 - DV137
+    DV117 = W17**2
+    DV127 = W17*W27
+    DV227 = W27**2
+    DV337 = W37**2
+    DW237 = DV227 - DV337
+    DW317 = DV337 - DV117
+    DW127 = DV117 - DV227
+    U117 = -DV227 - DV337
+    U127 = DV127 - WP37
+    U137 = DV137 + WP27
+    U217 = WP37 + DV127
+    U227 = -DV117 - DV337
+    U237 = DV237 - WP17
+    U317 = DV137 - WP27
+    U327 = DV237 + WP17
+    VSP17 = VP16 + D7*U116
+    VSP27 = VP26 + D7*U216
+    VSP37 = D7*U316 - VSP16
+    VP17 = C7*VSP17 + S7*VSP27
+    VP27 = C7*VSP27 - S7*VSP17
+    # Link 8
+    W18 = C8*W17 + S8*W37
+    W28 = C8*W37 - S8*W17
+    W38 = QP8 - W27
+    WP18 = C8*WP17 + S8*WP37 + QP8*W28
+    WP28 = C8*WP37 - S8*WP17 - QP8*W18
+    WP38 = QDP8 - WP27
+    DV118 = W18**2
+    DV128 = W18*W28
+    DV138 = W18*W38
+    DV228 = W28**2
+    DV238 = W28*W38
+    DV338 = W38**2
+    DW238 = DV228 - DV338
+    DW318 = DV338 - DV118
+    DW128 = DV118 - DV228
+    U118 = -DV228 - DV338
+    U128 = DV128 - WP38
+    U138 = WP28 + DV138
+    U218 = WP38 + DV128
+    U228 = -DV118 - DV338
+    U238 = DV238 - WP18
+    U318 = DV138 - WP28
+    U328 = WP18 + DV238
+    VSP18 = VP17 - RL8*U127
+    VSP28 = VP27 - RL8*U227
+    VSP38 = VSP37 - RL8*U327
+    VP18 = C8*VSP18 + S8*VSP38
+    VP28 = C8*VSP38 - S8*VSP18
+    # Joint 8
+    F18 = MX8*U118 + MY8*U128
+    F28 = MX8*U218 + MY8*U228
+    F38 = MX8*U318 + MY8*U328
+    N18 = XX8R*WP18 + ZZ8*DV238 + YZ8*DW238 + XZ8*U218 - XY8*U318 - MY8*VSP28
+    N28 = (XX8R - ZZ8)*DV138 + XZ8*DW318 + XY8*U328 + MX8*VSP28 - YZ8*U128
+    N38 = ZZ8*WP38 + XY8*DW128 + YZ8*U138 + MX8*VP28 - XX8R*DV128 - XZ8*U238 - MY8*VP18
+    FDI18 = C8*F18 - S8*F28
+    FDI38 = S8*F18 + C8*F28
+    # Joint 7
+    F17 = MX7*U117 + MY7R*U127
+    F27 = MX7*U217 + MY7R*U227
+    F37 = MX7*U317 + MY7R*U327
+    E17 = FDI18 + F17
+    E27 = F27 - F38
+    E37 = FDI38 + F37
+    N17 = XX7R*WP17 + ZZ7R*DV237 + YZ7*DW237 + XZ7*U217 + MY7R*VSP37 - XY7*U317
+    N27 = (XX7R - ZZ7R)*DV137 + XZ7*DW317 + XY7*U327 - YZ7*U127 - MX7*VSP37
+    N37 = ZZ7R*WP37 + XY7*DW127 + YZ7*U137 + MX7*VP27 - XX7R*DV127 - XZ7*U237 - MY7R*VP17
+    NE17 = C8*N18 + N17 - S8*N28 - RL8*FDI38
+    NE27 = N27 - N38
+    NE37 = S8*N18 + C8*N28 + RL8*FDI18 + N37
+    FDI27 = S7*E17 + C7*E27
+    # Joint 6
+    F36 = MX6R*U316 + MY6*U326
+    E36 = E37 + F36
+    N16 = XX6R*WP16 + ZZ6R*DV236 + YZ6*DW236 + XZ6R*U216 - XY6*U316 - MY6*VSP16
+    N26 = (XX6R - ZZ6R)*DV136 + XZ6R*DW316 + XY6*U326 + MX6R*VSP16 - YZ6*U126
+    N36 = ZZ6R*QDP6 + XY6*DW126 + YZ6*U136 + MX6R*VP26 - XX6R*DV126 - XZ6R*U236 - MY6*VP16
+    NE16 = C7*NE17 + N16 - S7*NE27
+    NE26 = S7*NE17 + C7*NE27 + N26 - D7*E37
+    NE36 = NE37 + D7*FDI27 + N36
+    # Joint 4
+    F14 = MX4R*U114 + MY4R*U124
+    F24 = MX4R*U214 + MY4R*U224
+    F34 = MX4R*U314 + MY4R*U324
+    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4R*DW234 + XZ4R*U214 + MY4R*VSP24 - XY4R*U314
+    N24 = (XX4R - ZZ4R)*DV134 + XZ4R*DW314 + XY4R*U324 - YZ4R*U124 - MX4R*VSP24
+    N34 = ZZ4R*WP34 + XY4R*DW124 + YZ4R*U134 + MX4R*VP24 - XX4R*DV124 - XZ4R*U234 - MY4R*VP14
+    FDI14 = S4*F14 + C4*F24
+    FDI34 = C4*F14 - S4*F24
+    # Joint 3
+    F13 = M3R*VP13 + MX3R*U332 - MY3R*U312 - MZ3*U322
+    F23 = M3R*VP23 + MY3R*U112 + MZ3*U122 - MX3R*U132
+    F33 = M3R*VP33 + MY3R*U212 + MZ3*U222 - MX3R*U232
+    E13 = FDI14 + F13
+    E23 = F34 + F23
+    E33 = FDI34 + F33
+    N13 = MY3R*VP33 - MZ3*VP23
+    N23 = MZ3*VP13 - MX3R*VP33
+    N33 = MX3R*VP23 - MY3R*VP13
+    NE13 = S4*N14 + C4*N24 + N13
+    NE23 = N34 + N23 - D4*FDI34
+    NE33 = C4*N14 + D4*F34 + N33 - S4*N24
+    # Joint 2
+    F12 = MX2*U112 + MY2*U122
+    F22 = MX2*U212 + MY2*U222
+    F32 = MX2*U312 + MY2*U322
+    E12 = F12 - E23
+    E22 = F22 - E33
+    E32 = E13 + F32
+    N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*U212 + MY2*VSP22 - XY2R*U312
+    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*U122 - MX2*VSP22
+    N32 = ZZ2R*QDP2 + XY2R*DW122 + YZ2R*U132 + MX2*VP22 - XX2R*DV122 - XZ2R*U232 - MY2*VP12
+    NE12 = N12 - NE23 - r3*E13
+    NE22 = N22 - NE33
+    NE32 = NE13 + N32 - r3*E23
+    FDI12 = C2*E12 - S2*E22
+    # Joint 1
+    N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1R*VP11
+    NE31 = D6*E36 + D2*E32 + N31 - S6*NE16 - C6*NE26 - S2*NE12 - C2*NE22 - RL2*FDI12
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
+    GAM[2] = OFFSET3 + E33 + Ia3*QDP3 + FV3*QP3 + FS3*np.sign(QP3)
+    GAM[3] = OFFSET4 + N34 + Ia4*QDP4 + FV4*QP4 + FS4*np.sign(QP4)
+    GAM[4] = OFFSET6 + NE36 + FV6*QP6 + FS6*np.sign(QP6)
+    GAM[5] = OFFSET7 + NE37 + Ia7*QDP7 + FV7*QP7 + FS7*np.sign(QP7)
+    GAM[6] = OFFSET8 + N38 + Ia8*QDP8 + FV8*QP8 + FS8*np.sign(QP8)
+
+
+def _inertia_matrix_block(q, A, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
+    """Fill A, shape (7, 7, N): column i is Gamma for a unit acceleration of joint i from rest. q: (7, N)."""
+    # Inputs
+    q2 = q[1]
+    q3 = q[2]
+    q4 = q[3]
+    q6 = q[4]
+    q7 = q[5]
+    q8 = q[6]
+    ZZ1R = X[0]
+    XX2R = X[6]
+    XY2R = X[7]
+    XZ2R = X[8]
+    YZ2R = X[9]
+    ZZ2R = X[10]
+    MX2 = X[11]
+    MY2 = X[12]
+    MX3R = X[16]
+    MY3R = X[17]
+    MZ3 = X[18]
+    M3R = X[19]
+    Ia3 = X[20]
+    XX4R = X[24]
+    XY4R = X[25]
+    XZ4R = X[26]
+    YZ4R = X[27]
+    ZZ4R = X[28]
+    MX4R = X[29]
+    MY4R = X[30]
+    Ia4 = X[31]
+    XX6R = X[35]
+    XY6 = X[36]
+    XZ6R = X[37]
+    YZ6 = X[38]
+    ZZ6R = X[39]
+    MX6R = X[40]
+    MY6 = X[41]
+    XX7R = X[45]
+    XY7 = X[46]
+    XZ7 = X[47]
+    YZ7 = X[48]
+    ZZ7R = X[49]
+    MX7 = X[50]
+    MY7R = X[51]
+    Ia7 = X[52]
+    XX8R = X[56]
+    XY8 = X[57]
+    XZ8 = X[58]
+    YZ8 = X[59]
+    ZZ8 = X[60]
+    MX8 = X[61]
+    MY8 = X[62]
+    Ia8 = X[63]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    th67 = q6 + q7
+    C67 = np.cos(th67)
+    S67 = np.sin(th67)
+    C8 = np.cos(q8)
+    S8 = np.sin(q8)
+    # Inputs
+    r3 = 0.1 + q3
+    # Link 2
+    VP121 = -RL2*C2
+    VP221 = RL2*S2
+    # Link 3
+    VSP331 = D2 + S2*r3
+    # Link 4
+    WP141 = C2*C4
+    WP241 = -C2*S4
+    VSP241 = D4*C2 - VP121
+    VSP341 = -VP221 - D4*S2
+    VP141 = S4*VSP331 + C4*VSP341
+    VP241 = C4*VSP331 - S4*VSP341
+    # Link 7
+    VSP371 = D6 + D7*C6
+    # Link 8
+    WP181 = -S67*C8
+    WP281 = S67*S8
+    VSP381 = VSP371 + RL8*S67
+    VP181 = S8*VSP381
+    VP281 = C8*VSP381
+    # Joint 8
+    F181 = -MY8*C67
+    F281 = MX8*C67
+    F381 = MY8*WP181 - MX8*WP281
+    N181 = XX8R*WP181 + XZ8*C67 + XY8*WP281
+    N281 = XY8*WP181 + YZ8*C67
+    N381 = ZZ8*C67 + YZ8*WP281 + XZ8*WP181 + MX8*VP281 - MY8*VP181
+    FDI181 = C8*F181 - S8*F281
+    FDI381 = S8*F181 + C8*F281
+    # Joint 7
+    F371 = MX7*C67 - MY7R*S67
+    E371 = FDI381 + F371
+    N371 = -YZ7*C67 - XZ7*S67
+    N171 = MY7R*VSP371 - XX7R*S67 - XY7*C67
+    N271 = -XY7*S67 - MX7*VSP371
+    NE171 = C8*N181 + N171 - S8*N281 - RL8*FDI381
+    NE271 = N271 - N381
+    NE371 = S8*N181 + C8*N281 + RL8*FDI181 + N371
+    FDI271 = S7*FDI181 - C7*F381
+    # Joint 6
+    F361 = MX6R*C6 - MY6*S6
+    E361 = E371 + F361
+    N361 = -YZ6*C6 - XZ6R*S6
+    N161 = MY6*D6 - XX6R*S6 - XY6*C6
+    N261 = -XY6*S6 - MX6R*D6
+    NE161 = C7*NE171 + N161 - S7*NE271
+    NE261 = S7*NE171 + C7*NE271 + N261 - D7*E371
+    NE361 = NE371 + D7*FDI271 + N361
+    # Joint 4
+    F141 = -MY4R*S2
+    F241 = MX4R*S2
+    F341 = MY4R*WP141 - MX4R*WP241
+    N141 = XX4R*WP141 + XZ4R*S2 + XY4R*WP241 + MY4R*VSP241
+    N241 = XY4R*WP141 + YZ4R*S2 - MX4R*VSP241
+    N341 = ZZ4R*S2 + YZ4R*WP241 + XZ4R*WP141 + MX4R*VP241 - MY4R*VP141
+    FDI141 = S4*F141 + C4*F241
+    FDI341 = C4*F141 - S4*F241
+    # Joint 3
+    F131 = M3R*VSP331 + MZ3*S2 - MY3R*C2
+    F231 = MX3R*C2 - M3R*VP121
+    F331 = -M3R*VP221 - MX3R*S2
+    E131 = FDI141 + F131
+    E231 = F341 + F231
+    E331 = FDI341 + F331
+    N131 = MZ3*VP121 - MY3R*VP221
+    N231 = MZ3*VSP331 + MX3R*VP221
+    N331 = -MX3R*VP121 - MY3R*VSP331
+    NE131 = S4*N141 + C4*N241 + N131
+    NE231 = N341 + N231 - D4*FDI341
+    NE331 = C4*N141 + D4*F341 + N331 - S4*N241
+    # Joint 2
+    F321 = MX2*C2 - MY2*S2
+    E321 = E131 + F321
+    N121 = MY2*D2 - XX2R*S2 - XY2R*C2
+    N221 = -XY2R*S2 - MX2*D2
+    N321 = MX2*VP221 - YZ2R*C2 - XZ2R*S2 - MY2*VP121
+    NE121 = N121 - NE231 - r3*E131
+    NE221 = N221 - NE331
+    NE321 = NE131 + N321 - r3*E231
+    FDI121 = S2*E331 - C2*E231
+    # Joint 1
+    NE311 = ZZ1R + D6*E361 + D2*E321 - S6*NE161 - C6*NE261 - S2*NE121 - C2*NE221 - RL2*FDI121
+    # Joint 4
+    F342 = MY4R*S4 - MX4R*C4
+    N342 = YZ4R*C4 + XZ4R*S4
+    N142 = XX4R*S4 + XY4R*C4 - MY4R*r3
+    N242 = XY4R*S4 + MX4R*r3
+    # Joint 3
+    F232 = -MZ3 - M3R*r3
+    E232 = F342 + F232
+    N132 = MZ3*r3
+    NE132 = S4*N142 + C4*N242 + N132
+    # Joint 2
+    NE322 = ZZ2R + NE132 - r3*E232
+    # Joint 4
+    N343 = -MX4R*S4 - MY4R*C4
+    # Link 7
+    VP176 = D7*S7
+    VP276 = D7*C7
+    # Link 8
+    VSP186 = RL8 + VP176
+    VP186 = C8*VSP186
+    VP286 = -S8*VSP186
+    # Joint 8
+    F386 = MY8*S8 - MX8*C8
+    N187 = XX8R*S8 + XY8*C8
+    N287 = XY8*S8
+    YZ8C8pXZ8S8 = YZ8*C8 + XZ8*S8
+    N186 = N187 - MY8*VP276
+    N286 = N287 + MX8*VP276
+    N386 = YZ8C8pXZ8S8 + MX8*VP286 - MY8*VP186
+    # Joint 7
+    E276 = MX7 - F386
+    N376 = ZZ7R + MX7*VP276 - MY7R*VP176
+    NE376 = S8*N186 + C8*N286 + N376
+    FDI276 = C7*E276 - MY7R*S7
+    # Joint 6
+    NE366 = ZZ6R + NE376 + D7*FDI276
+    # Link 8
+    VP187 = RL8*C8
+    VP287 = -RL8*S8
+    # Joint 8
+    N387 = YZ8C8pXZ8S8 + MX8*VP287 - MY8*VP187
+    # Joint 7
+    NE377 = ZZ7R + S8*N187 + C8*N287
+    # Inertia matrix
+    A[0, 0] = NE311
+    A[1, 0] = A[0, 1] = NE321
+    A[2, 0] = A[0, 2] = E331
+    A[3, 0] = A[0, 3] = N341
+    A[4, 0] = A[0, 4] = NE361
+    A[5, 0] = A[0, 5] = NE371
+    A[6, 0] = A[0, 6] = N381
+    A[1, 1] = NE322
+    A[2, 1] = A[1, 2] = MY3R
+    A[3, 1] = A[1, 3] = N342
+    A[4, 1] = A[1, 4] = 0.0
+    A[5, 1] = A[1, 5] = 0.0
+    A[6, 1] = A[1, 6] = 0.0
+    A[2, 2] = M3R + Ia3
+    A[3, 2] = A[2, 3] = N343
+    A[4, 2] = A[2, 4] = 0.0
+    A[5, 2] = A[2, 5] = 0.0
+    A[6, 2] = A[2, 6] = 0.0
+    A[3, 3] = ZZ4R + Ia4
+    A[4, 3] = A[3, 4] = 0.0
+    A[5, 3] = A[3, 5] = 0.0
+    A[6, 3] = A[3, 6] = 0.0
+    A[4, 4] = NE366
+    A[5, 4] = A[4, 5] = NE376
+    A[6, 4] = A[4, 6] = N386
+    A[5, 5] = Ia7 + NE377
+    A[6, 5] = A[5, 6] = N387
+    A[6, 6] = ZZ8 + Ia8
+
+
+def _bias_block(q, qd, GAM, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
+    """Fill GAM, shape (7, N), for qdd = 0. q, qd: (7, N)."""
+    # Inputs
+    q1, q2, q3, q4, q6, q7, q8 = q
+    QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
+    MX1R = X[1]
+    MY1R = X[2]
+    FV1 = X[3]
+    FS1 = X[4]
+    OFFSET1 = X[5]
+    XX2R = X[6]
+    XY2R = X[7]
+    XZ2R = X[8]
+    YZ2R = X[9]
+    ZZ2R = X[10]
+    MX2 = X[11]
+    MY2 = X[12]
+    FV2 = X[13]
+    FS2 = X[14]
+    OFFSET2 = X[15]
+    MX3R = X[16]
+    MY3R = X[17]
+    MZ3 = X[18]
+    M3R = X[19]
+    FV3 = X[21]
+    FS3 = X[22]
+    OFFSET3 = X[23]
+    XX4R = X[24]
+    XY4R = X[25]
+    XZ4R = X[26]
+    YZ4R = X[27]
+    ZZ4R = X[28]
+    MX4R = X[29]
+    MY4R = X[30]
+    FV4 = X[32]
+    FS4 = X[33]
+    OFFSET4 = X[34]
+    XX6R = X[35]
+    XY6 = X[36]
+    XZ6R = X[37]
+    YZ6 = X[38]
+    ZZ6R = X[39]
+    MX6R = X[40]
+    MY6 = X[41]
+    FV6 = X[42]
+    FS6 = X[43]
+    OFFSET6 = X[44]
+    XX7R = X[45]
+    XY7 = X[46]
+    XZ7 = X[47]
+    YZ7 = X[48]
+    ZZ7R = X[49]
+    MX7 = X[50]
+    MY7R = X[51]
+    FV7 = X[53]
+    FS7 = X[54]
+    OFFSET7 = X[55]
+    XX8R = X[56]
+    XY8 = X[57]
+    XZ8 = X[58]
+    YZ8 = X[59]
+    ZZ8 = X[60]
+    MX8 = X[61]
+    MY8 = X[62]
+    FV8 = X[64]
+    FS8 = X[65]
+    OFFSET8 = X[66]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    th67 = q6 + q7
+    C67 = np.cos(th67)
+    S67 = np.sin(th67)
+    C8 = np.cos(q8)
+    S8 = np.sin(q8)
+    # Inputs
+    r3 = 0.1 + q3
+    # Link 1
+    DV331 = QP1**2
+    VP11 = -GX*C1
+    VP21 = GX*S1
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    WP12 = QP2*W22
+    WP22 = -QP2*W12
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U222 = -DV112 - DV332
+    U312 = -2*WP22
+    U322 = 2*WP12
+    U332 = -DV112 - DV222
+    VSP12 = VP11 - D2*DV331
+    VSP22 = VP21 - RL2*DV331
+    VP12 = C2*VSP12 + GZ*S2
+    VP22 = GZ*C2 - S2*VSP12
+    # Link 3
+    VSP13 = VP12 - r3*DV122
+    VSP23 = VP22 - r3*U222
+    VSP33 = VSP22 - r3*U322
+    QP3x2 = 2*QP3
+    VP13 = VSP33 - W12*QP3x2
+    VP23 = -VSP13 - QP2*QP3x2
+    # Link 4
+    W14 = S4*QP2 - C4*W22
+    W24 = S4*W22 + C4*QP2
+    W34 = QP4 - W12
+    WP14 = QP4*W24 - C4*WP22
+    WP24 = S4*WP22 - QP4*W14
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = WP12 + DV124
+    U134 = WP24 + DV134
+    U214 = DV124 - WP12
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VSP14 = VP13 + D4*U332
+    VP14 = S4*VSP14 - C4*VSP23
+    VP24 = S4*VSP23 + C4*VSP14
+    # Link 6
+    W16 = -S6*QP1
+    W26 = -C6*QP1
+    WP16 = QP6*W26
+    WP26 = -QP6*W16
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV226 = W26**2
+    DV336 = QP6**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U316 = -2*WP26
+    U326 = 2*WP16
+    VSP26 = VP21 - D6*DV331
+    VP16 = C6*VSP26 + GZ*S6
+    VP26 = GZ*C6 - S6*VSP26
+    # Link 7
+    W37 = QP6 + QP7
+    W17 = -S67*QP1
+    W27 = -C67*QP1
+    WP17 = W37*W27
+    WP27 = -W37*W17
+    DV117 = W17**2
+    DV127 = W17*W27
+    DV227 = W27**2
+    DV337 = W37**2
+    DW237 = DV227 - DV337
+    DW317 = DV337 - DV117
+    DW127 = DV117 - DV227
+    U117 = -DV227 - DV337
+    U227 = -DV117 - DV337
+    U317 = -2*WP27
+    U327 = 2*WP17
+    VSP17 = VP16 + D7*U116
+    VSP27 = VP26 + D7*DV126
+    VSP37 = D7*U316 - VP11
+    VP17 = C7*VSP17 + S7*VSP27
+    VP27 = C7*VSP27 - S7*VSP17
+    # Link 8
+    W18 = C8*W17 + S8*W37
+    W28 = C8*W37 - S8*W17
+    W38 = QP8 - W27
+    WP18 = C8*WP17 + QP8*W28
+    WP28 = -S8*WP17 - QP8*W18
+    DV118 = W18**2
+    DV128 = W18*W28
+    DV138 = W18*W38
+    DV228 = W28**2
+    DV238 = W28*W38
+    DV338 = W38**2
+    DW238 = DV228 - DV338
+    DW318 = DV338 - DV118
+    DW128 = DV118 - DV228
+    U118 = -DV228 - DV338
+    U128 = WP27 + DV128
+    U138 = WP28 + DV138
+    U218 = DV128 - WP27
+    U228 = -DV118 - DV338
+    U238 = DV238 - WP18
+    U318 = DV138 - WP28
+    U328 = WP18 + DV238
+    VSP18 = VP17 - RL8*DV127
+    VSP28 = VP27 - RL8*U227
+    VSP38 = VSP37 - RL8*U327
+    VP18 = C8*VSP18 + S8*VSP38
+    VP28 = C8*VSP38 - S8*VSP18
+    # Joint 8
+    F18 = MX8*U118 + MY8*U128
+    F28 = MX8*U218 + MY8*U228
+    F38 = MX8*U318 + MY8*U328
+    N18 = XX8R*WP18 + ZZ8*DV238 + YZ8*DW238 + XZ8*U218 - XY8*U318 - MY8*VSP28
+    N28 = (XX8R - ZZ8)*DV138 + XZ8*DW318 + XY8*U328 + MX8*VSP28 - YZ8*U128
+    N38 = XY8*DW128 + YZ8*U138 + MX8*VP28 - ZZ8*WP27 - XX8R*DV128 - XZ8*U238 - MY8*VP18
+    FDI18 = C8*F18 - S8*F28
+    FDI38 = S8*F18 + C8*F28
+    # Joint 7
+    F17 = MX7*U117 + MY7R*DV127
+    F27 = MX7*DV127 + MY7R*U227
+    F37 = MX7*U317 + MY7R*U327
+    E17 = FDI18 + F17
+    E27 = F27 - F38
+    E37 = FDI38 + F37
+    N17 = XX7R*WP17 + ZZ7R*WP17 + YZ7*DW237 + XZ7*DV127 + MY7R*VSP37 - XY7*U317
+    N27 = XZ7*DW317 + XY7*U327 - (XX7R - ZZ7R)*WP27 - YZ7*DV127 - MX7*VSP37
+    N37 = XY7*DW127 + MX7*VP27 - XX7R*DV127 - MY7R*VP17
+    NE17 = C8*N18 + N17 - S8*N28 - RL8*FDI38
+    NE27 = N27 - N38
+    NE37 = S8*N18 + C8*N28 + RL8*FDI18 + N37
+    FDI27 = S7*E17 + C7*E27
+    # Joint 6
+    F36 = MX6R*U316 + MY6*U326
+    E36 = E37 + F36
+    N16 = XX6R*WP16 + ZZ6R*WP16 + YZ6*DW236 + XZ6R*DV126 - XY6*U316 - MY6*VP11
+    N26 = XZ6R*DW316 + XY6*U326 + MX6R*VP11 - (XX6R - ZZ6R)*WP26 - YZ6*DV126
+    N36 = XY6*DW126 + MX6R*VP26 - XX6R*DV126 - MY6*VP16
+    NE16 = C7*NE17 + N16 - S7*NE27
+    NE26 = S7*NE17 + C7*NE27 + N26 - D7*E37
+    NE36 = NE37 + D7*FDI27 + N36
+    # Joint 4
+    F14 = MX4R*U114 + MY4R*U124
+    F24 = MX4R*U214 + MY4R*U224
+    F34 = MX4R*U314 + MY4R*U324
+    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4R*DW234 + XZ4R*U214 + MY4R*VP23 - XY4R*U314
+    N24 = (XX4R - ZZ4R)*DV134 + XZ4R*DW314 + XY4R*U324 - YZ4R*U124 - MX4R*VP23
+    N34 = XY4R*DW124 + YZ4R*U134 + MX4R*VP24 - ZZ4R*WP12 - XX4R*DV124 - XZ4R*U234 - MY4R*VP14
+    FDI14 = S4*F14 + C4*F24
+    FDI34 = C4*F14 - S4*F24
+    # Joint 3
+    F13 = M3R*VP13 + MX3R*U332 - MY3R*U312 - MZ3*U322
+    F23 = M3R*VP23 + MY3R*U112 + MZ3*DV122
+    F33 = MY3R*DV122 + MZ3*U222 - M3R*VSP23
+    E13 = FDI14 + F13
+    E23 = F34 + F23
+    E33 = FDI34 + F33
+    N13 = -MY3R*VSP23 - MZ3*VP23
+    N23 = MZ3*VP13 + MX3R*VSP23
+    N33 = MX3R*VP23 - MY3R*VP13
+    NE13 = S4*N14 + C4*N24 + N13
+    NE23 = N34 + N23 - D4*FDI34
+    NE33 = C4*N14 + D4*F34 + N33 - S4*N24
+    # Joint 2
+    F12 = MX2*U112 + MY2*DV122
+    F22 = MX2*DV122 + MY2*U222
+    F32 = MX2*U312 + MY2*U322
+    E12 = F12 - E23
+    E22 = F22 - E33
+    E32 = E13 + F32
+    N12 = XX2R*WP12 + ZZ2R*WP12 + YZ2R*DW232 + XZ2R*DV122 + MY2*VSP22 - XY2R*U312
+    N22 = XZ2R*DW312 + XY2R*U322 - (XX2R - ZZ2R)*WP22 - YZ2R*DV122 - MX2*VSP22
+    N32 = XY2R*DW122 + MX2*VP22 - XX2R*DV122 - MY2*VP12
+    NE12 = N12 - NE23 - r3*E13
+    NE22 = N22 - NE33
+    NE32 = NE13 + N32 - r3*E23
+    FDI12 = C2*E12 - S2*E22
+    # Joint 1
+    N31 = MX1R*VP21 - MY1R*VP11
+    NE31 = D6*E36 + D2*E32 + N31 - S6*NE16 - C6*NE26 - S2*NE12 - C2*NE22 - RL2*FDI12
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
+    GAM[2] = OFFSET3 + E33 + FV3*QP3 + FS3*np.sign(QP3)
+    GAM[3] = OFFSET4 + N34 + FV4*QP4 + FS4*np.sign(QP4)
+    GAM[4] = OFFSET6 + NE36 + FV6*QP6 + FS6*np.sign(QP6)
+    GAM[5] = OFFSET7 + NE37 + FV7*QP7 + FS7*np.sign(QP7)
+    GAM[6] = OFFSET8 + N38 + FV8*QP8 + FS8*np.sign(QP8)
+
+
+def _gravity_block(q, GAM, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
+    """Fill GAM, shape (7, N), at rest. q: (7, N)."""
+    # Inputs
+    q1, q2, q3, q4, q6, q7, q8 = q
+    MX1R = X[1]
+    MY1R = X[2]
+    OFFSET1 = X[5]
+    MX2 = X[11]
+    MY2 = X[12]
+    OFFSET2 = X[15]
+    MX3R = X[16]
+    MY3R = X[17]
+    MZ3 = X[18]
+    M3R = X[19]
+    OFFSET3 = X[23]
+    MX4R = X[29]
+    MY4R = X[30]
+    OFFSET4 = X[34]
+    MX6R = X[40]
+    MY6 = X[41]
+    OFFSET6 = X[44]
+    MX7 = X[50]
+    MY7R = X[51]
+    OFFSET7 = X[55]
+    MX8 = X[61]
+    MY8 = X[62]
+    OFFSET8 = X[66]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    C8 = np.cos(q8)
+    S8 = np.sin(q8)
+    # Inputs
+    r3 = 0.1 + q3
+    # Link 1
+    VP11 = -GX*C1
+    VP21 = GX*S1
+    # Link 2
+    VP12 = C2*VP11 + GZ*S2
+    VP22 = GZ*C2 - S2*VP11
+    # Link 4
+    VP14 = S4*VP21 - C4*VP22
+    VP24 = S4*VP22 + C4*VP21
+    # Link 6
+    VP16 = C6*VP21 + GZ*S6
+    VP26 = GZ*C6 - S6*VP21
+    # Link 7
+    VP17 = C7*VP16 + S7*VP26
+    VP27 = C7*VP26 - S7*VP16
+    # Link 8
+    VP18 = C8*VP17 - S8*VP11
+    VP28 = -C8*VP11 - S8*VP17
+    # Joint 8
+    N18 = -MY8*VP27
+    N28 = MX8*VP27
+    N38 = MX8*VP28 - MY8*VP18
+    # Joint 7
+    N17 = -MY7R*VP11
+    N27 = MX7*VP11
+    N37 = MX7*VP27 - MY7R*VP17
+    NE17 = C8*N18 + N17 - S8*N28
+    NE27 = N27 - N38
+    NE37 = S8*N18 + C8*N28 + N37
+    # Joint 6
+    N16 = -MY6*VP11
+    N26 = MX6R*VP11
+    N36 = MX6R*VP26 - MY6*VP16
+    NE16 = C7*NE17 + N16 - S7*NE27
+    NE26 = S7*NE17 + C7*NE27 + N26
+    NE36 = NE37 + N36
+    # Joint 4
+    N14 = -MY4R*VP12
+    N24 = MX4R*VP12
+    N34 = MX4R*VP24 - MY4R*VP14
+    # Joint 3
+    F13 = M3R*VP21
+    F23 = -M3R*VP12
+    F33 = -M3R*VP22
+    N13 = MZ3*VP12 - MY3R*VP22
+    N23 = MZ3*VP21 + MX3R*VP22
+    N33 = -MX3R*VP12 - MY3R*VP21
+    NE13 = S4*N14 + C4*N24 + N13
+    NE23 = N34 + N23
+    NE33 = C4*N14 + N33 - S4*N24
+    # Joint 2
+    N12 = MY2*VP21
+    N22 = -MX2*VP21
+    N32 = MX2*VP22 - MY2*VP12
+    NE12 = N12 - NE23 - r3*F13
+    NE22 = N22 - NE33
+    NE32 = NE13 + N32 - r3*F23
+    FDI12 = S2*F33 - C2*F23
+    # Joint 1
+    N31 = MX1R*VP21 - MY1R*VP11
+    NE31 = D2*F13 + N31 - S6*NE16 - C6*NE26 - S2*NE12 - C2*NE22 - RL2*FDI12
+    # Torques
+    GAM[0] = OFFSET1 + NE31
+    GAM[1] = OFFSET2 + NE32
+    GAM[2] = OFFSET3 + F33
+    GAM[3] = OFFSET4 + N34
+    GAM[4] = OFFSET6 + NE36
+    GAM[5] = OFFSET7 + NE37
+    GAM[6] = OFFSET8 + N38
+
+
+def _frame_poses_block(q, T, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
+    """Fill T, shape (8, 4, 4, N). q: (7, N)."""
+    # Inputs
+    q1, q2, q3, q4, q6, q7, q8 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    th67 = q6 + q7
+    C67 = np.cos(th67)
+    S67 = np.sin(th67)
+    C8 = np.cos(q8)
+    S8 = np.sin(q8)
+    # Inputs
+    r3 = 0.1 + q3
+    # Frame 2
+    R112 = C1*C2
+    R122 = -C1*S2
+    R212 = S1*C2
+    R222 = -S1*S2
+    P12 = D2*C1 - RL2*S1
+    P22 = D2*S1 + RL2*C1
+    # Frame 3
+    P13 = P12 - r3*R122
+    P23 = P22 - r3*R222
+    P33 = C2*r3
+    # Frame 4
+    R114 = -S1*S4 - C4*R122
+    R124 = S4*R122 - S1*C4
+    R214 = C1*S4 - C4*R222
+    R224 = S4*R222 + C1*C4
+    R314 = C2*C4
+    R324 = -C2*S4
+    P14 = P13 - D4*S1
+    P24 = P23 + D4*C1
+    # Frame 5
+    P15 = P14 + D5*R114 - RL5*R124
+    P25 = P24 + D5*R214 - RL5*R224
+    P35 = P33 + D5*R314 - RL5*R324
+    # Frame 6
+    R116 = -S1*C6
+    R126 = S1*S6
+    R216 = C1*C6
+    R226 = -C1*S6
+    P16 = -D6*S1
+    P26 = D6*C1
+    # Frame 7
+    R117 = -S1*C67
+    R127 = S1*S67
+    R217 = C1*C67
+    R227 = -C1*S67
+    P17 = P16 + D7*R116
+    P27 = P26 + D7*R216
+    P37 = B6 - D7*S6
+    # Frame 8
+    R118 = C8*R117 - C1*S8
+    R128 = -C1*C8 - S8*R117
+    R218 = C8*R217 - S1*S8
+    R228 = -S1*C8 - S8*R217
+    R318 = -S67*C8
+    R328 = S67*S8
+    P18 = P17 - RL8*R127
+    P28 = P27 - RL8*R227
+    P38 = P37 + RL8*C67
+    # Poses
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 0, 2] = 0.0
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 1, 2] = 0.0
+    T[0, 2, 0] = 0.0
+    T[0, 2, 1] = 0.0
+    T[0, 2, 2] = 1.0
+    T[0, 0, 3] = 0.0
+    T[0, 1, 3] = 0.0
+    T[0, 2, 3] = 0.0
+    T[1, 0, 0] = R112
+    T[1, 0, 1] = R122
+    T[1, 0, 2] = -S1
+    T[1, 1, 0] = R212
+    T[1, 1, 1] = R222
+    T[1, 1, 2] = C1
+    T[1, 2, 0] = -S2
+    T[1, 2, 1] = -C2
+    T[1, 2, 2] = 0.0
+    T[1, 0, 3] = P12
+    T[1, 1, 3] = P22
+    T[1, 2, 3] = 0.0
+    T[2, 0, 0] = -S1
+    T[2, 0, 1] = -R112
+    T[2, 0, 2] = -R122
+    T[2, 1, 0] = C1
+    T[2, 1, 1] = -R212
+    T[2, 1, 2] = -R222
+    T[2, 2, 0] = 0.0
+    T[2, 2, 1] = S2
+    T[2, 2, 2] = C2
+    T[2, 0, 3] = P13
+    T[2, 1, 3] = P23
+    T[2, 2, 3] = P33
+    T[3, 0, 0] = R114
+    T[3, 0, 1] = R124
+    T[3, 0, 2] = -R112
+    T[3, 1, 0] = R214
+    T[3, 1, 1] = R224
+    T[3, 1, 2] = -R212
+    T[3, 2, 0] = R314
+    T[3, 2, 1] = R324
+    T[3, 2, 2] = S2
+    T[3, 0, 3] = P14
+    T[3, 1, 3] = P24
+    T[3, 2, 3] = P33
+    T[4, 0, 0] = R114
+    T[4, 0, 1] = -R112
+    T[4, 0, 2] = -R124
+    T[4, 1, 0] = R214
+    T[4, 1, 1] = -R212
+    T[4, 1, 2] = -R224
+    T[4, 2, 0] = R314
+    T[4, 2, 1] = S2
+    T[4, 2, 2] = -R324
+    T[4, 0, 3] = P15
+    T[4, 1, 3] = P25
+    T[4, 2, 3] = P35
+    T[5, 0, 0] = R116
+    T[5, 0, 1] = R126
+    T[5, 0, 2] = -C1
+    T[5, 1, 0] = R216
+    T[5, 1, 1] = R226
+    T[5, 1, 2] = -S1
+    T[5, 2, 0] = -S6
+    T[5, 2, 1] = -C6
+    T[5, 2, 2] = 0.0
+    T[5, 0, 3] = P16
+    T[5, 1, 3] = P26
+    T[5, 2, 3] = B6
+    T[6, 0, 0] = R117
+    T[6, 0, 1] = R127
+    T[6, 0, 2] = -C1
+    T[6, 1, 0] = R217
+    T[6, 1, 1] = R227
+    T[6, 1, 2] = -S1
+    T[6, 2, 0] = -S67
+    T[6, 2, 1] = -C67
+    T[6, 2, 2] = 0.0
+    T[6, 0, 3] = P17
+    T[6, 1, 3] = P27
+    T[6, 2, 3] = P37
+    T[7, 0, 0] = R118
+    T[7, 0, 1] = R128
+    T[7, 0, 2] = -R127
+    T[7, 1, 0] = R218
+    T[7, 1, 1] = R228
+    T[7, 1, 2] = -R227
+    T[7, 2, 0] = R318
+    T[7, 2, 1] = R328
+    T[7, 2, 2] = C67
+    T[7, 0, 3] = P18
+    T[7, 1, 3] = P28
+    T[7, 2, 3] = P38

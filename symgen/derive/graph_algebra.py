@@ -1,0 +1,101 @@
+"""The algebra of graph nodes: the recursions over it become text."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from symgen.derive.graph import Graph
+from symgen.derive.names import Names
+from symgen.derive.scalar import Scalar, Turn
+from symgen.description.expression import Expression, call, quarter_turns
+from symgen.description.robot import Robot
+
+ActiveRow = tuple[tuple[int, Expression], ...]
+
+
+class GraphAlgebra:
+    """Scalars are nodes of one graph: inputs q1, QP1, QDP1 ... and the constants of the robot file under their names.
+
+    `sections` are (index of the first node, title); `angles` remembers what angle a cos or sin node is of.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot, self.graph = robot, Graph()
+        self.named = Names(len(robot.frames))
+        self.sections: list[tuple[int, str]] = []
+        self.angles: dict[int, tuple[Turn, Expression]] = {}
+        self._labels: dict[str, tuple[Turn, Expression]] = {}
+
+    def section(self, title: str) -> None:
+        self.sections.append((len(self.graph.nodes), title))
+
+    def constant(self, e: Expression) -> Scalar:
+        return e.evaluate(lambda name: self.graph.symbol(name, fixed=True), self._call, self._number)
+
+    def _number(self, c: Fraction) -> Scalar:
+        return self.graph.number(c)
+
+    def _call(self, function: str, argument: Expression) -> Scalar:
+        x = self.graph.lift(self.constant(argument))
+        if function in ("cos", "sin"):
+            value = self.graph.cos(x) if function == "cos" else self.graph.sin(x)
+            self.angles[value.node.index] = ((), argument if value.sign > 0 or function == "cos" else -argument)
+            return value
+        return self.graph.sqrt(x) if function == "sqrt" else self.graph.inverse(x)
+
+    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
+        if not turn:
+            return self.constant(call("cos", offset)), self.constant(call("sin", offset))
+        quarters, rest = quarter_turns(offset)
+        forward = turn[0][1] > 0
+        if not forward:
+            turn, rest = tuple((j, -n) for j, n in turn), -rest
+        angle: Scalar = 0
+        for j, n in turn:
+            term = self.graph.symbol(f"q{j}")
+            angle = angle + (term if n == 1 else -term if n == -1 else term * self.graph.lift(n))
+        angle = angle + self.constant(rest)
+        label = self._label(turn)
+        while self._labels.setdefault(label, (turn, rest)) != (turn, rest):
+            label += "b"  # the same joints with another constant
+        self.graph.name(angle, "th" + label)
+        c, s = self.graph.cos(angle), self.graph.sin(angle)
+        for value, letter in ((c, "C"), (s, "S")):
+            self.angles[value.node.index] = (turn, rest)
+            self.graph.name(value, letter + label)
+        if not forward:
+            s = -s
+        return ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
+
+    def _label(self, turn: Turn) -> str:
+        """23 for q2 + q3, 5m2 for q5 - q2, 2x3 for 2 q3."""
+        text = ""
+        for j, n in turn:
+            times = f"{abs(n)}x" if abs(n) != 1 else ""
+            text += ("m" if n < 0 else self.named.separator if text else "") + times + str(j)
+        return text
+
+    def q(self, j: int) -> Scalar:
+        return self.graph.symbol(f"q{j}")
+
+    def qd(self, j: int) -> Scalar:
+        return self.graph.symbol(f"QP{j}")
+
+    def qdd(self, j: int) -> Scalar:
+        return self.graph.symbol(f"QDP{j}")
+
+    def sign(self, rate: Scalar, row: ActiveRow) -> Scalar:
+        return self.graph.sign(rate)
+
+    def one_sided(self, rate: Scalar, row: ActiveRow, when: str) -> tuple[Scalar, Scalar]:
+        if when == "positive":
+            return self.graph.positive_part(self.graph.sign(rate)), self.graph.positive_part(rate)
+        return -self.graph.positive_part(-self.graph.sign(rate)), -self.graph.positive_part(-rate)
+
+    def name(self, value: Scalar, name: str) -> Scalar:
+        return self.graph.name(value, name)
+
+
+
+    def hint(self, value: Scalar, name: str) -> Scalar:
+        return self.graph.hint(value, name)

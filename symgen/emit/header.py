@@ -1,0 +1,148 @@
+"""The header of an emitted module, and its tables: what a reader needs before the first line of code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from textwrap import wrap
+from typing import Any
+
+from symgen.description.robot import FIXED, Robot
+from symgen.emit.spec import WIDTH, ModuleSpec, unit
+
+COLUMNS = ("j", "ant", "mu", "sigma", "gamma", "b", "alpha", "d", "theta", "r")
+
+
+def header(spec: ModuleSpec) -> list[str]:
+    """Lines of the module docstring below the command."""
+    robot, regrouping = spec.robot, spec.regrouping
+    gravity = ", ".join(str(e) for e in robot.gravity)
+    lines = [
+        "",
+        "Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS",
+        *(f"    {line}" for line in frame_table(robot)),
+        f"Gravity     acceleration ({gravity}) in frame 0, m/s**2",
+        "Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET",
+        "Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments",
+        *(f"Element     {line}" for line in element_lines(robot)),
+        "",
+        f"Base parameters, {len(regrouping)} of {len(robot.parameters)}; Gautier and Khalil (1990), exact",
+    ]
+    alone = [b.name for b in regrouping.base if b.name == b.own]
+    for b in regrouping.base:
+        if b.name != b.own:
+            lines += wrapped(f"{b.name} = {b.formula}", "    ")
+    if alone:
+        lines += wrapped("as they are: " + " ".join(alone), "    ")
+    lines += wrapped("No effect: " + (" ".join(regrouping.no_effect) or "none"), "")
+    lines += ["", "Cost per sample"]
+    for name in ("regressor", "inverse_dynamics", "inertia_matrix", "bias", "gravity", "frame_poses"):
+        lines.append(f"    {name:<17} {getattr(spec, name).cost}")
+    return lines
+
+
+def frame_table(robot: Robot) -> list[str]:
+    """The rows of the frame table, aligned; columns that are zero everywhere are left out, except the classical six."""
+    rows = [[str(getattr(f, c)) for c in COLUMNS] for f in robot.frames]
+    kept = [k for k, c in enumerate(COLUMNS) if c in ("j", "ant", "sigma", "alpha", "d", "theta", "r") or _informative(c, rows, k)]
+    table = [[COLUMNS[k] for k in kept], *([row[k] for k in kept] for row in rows)]
+    widths = [max(len(row[k]) for row in table) for k in range(len(kept))]
+    return ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
+
+
+def _informative(column: str, rows: Sequence[Sequence[str]], k: int) -> bool:
+    return any(row[k] != "0" for row in rows) if column != "mu" else any(row[k] == "0" and row[COLUMNS.index("sigma")] != str(FIXED) for row in rows)
+
+
+def element_lines(robot: Robot) -> list[str]:
+    """One line per element family: which rows or forms its parameters act along."""
+    lines = []
+    for e in robot.elements:
+        rows = {j: " + ".join(_times(c, f"q{i}") for i, c in row.items()) for j, row in e.along.items()}
+        own = [j for j in rows if rows[j] == f"q{j}"]
+        parts = []
+        if own:
+            parts.append(f"along q{', q'.join(map(str, own))}")
+        parts += [f"{e.family}{j} along {rows[j]}" for j in rows if j not in own]
+        parts += [f"{e.family}{j} in the form {_form_text(form)}" for j, form in e.form.items()]
+        when = f", {e.when} motion only" if e.when else ""
+        lines += wrapped(f"{e.family:<7} {e.kind}{when}: {'; '.join(parts)}", "", "            ")
+    return lines
+
+
+def _times(c: Any, name: str) -> str:
+    return name if str(c) == "1" else f"{c}*{name}"
+
+
+def _form_text(form: Mapping[tuple[int, int], Any]) -> str:
+    parts = [_times(c * (1 if i == j else 2), f"q{i}**2" if i == j else f"q{i}*q{j}") for (i, j), c in sorted(form.items(), reverse=True) if i <= j]
+    return " + ".join(parts)
+
+
+def tables(spec: ModuleSpec) -> list[str]:
+    """The constants of the module, as Python source."""
+    robot, regrouping = spec.robot, spec.regrouping
+    return [
+        f"SCHEMA = {1!r}",
+        f"NAME = {robot.name!r}",
+        f"SOURCE_SHA256 = {robot.sha256!r}",
+        f"JOINTS = {robot.joints!r}",
+        *literal("CONSTANTS", dict(robot.constants)),
+        *literal("BASE_PARAMETERS", regrouping.names),
+        *literal("STANDARD_PARAMETERS", robot.parameters),
+        *literal("UNITS", {b.name: unit(robot, b.own) for b in regrouping.base}),
+        *literal("FORMULAS", {b.name: b.formula for b in regrouping.base}),
+        *literal("NO_EFFECT", regrouping.no_effect),
+        "STRUCTURE = np.array([[mark == \"x\" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j",
+        *(f"    {line}" for line in _marks(spec)),
+        ")])",
+        *_drives(robot),
+        *literal("LIMITS", dict(robot.limits)),
+        *literal("VALUES", dict(robot.values)),
+    ]
+
+
+def _drives(robot: Robot) -> list[str]:
+    d = robot.drives
+    if d is None:
+        return ["DRIVES = None"]
+    rows = [f"        {row!r}," for row in d.ratio]
+    return [
+        "DRIVES = {  # qm = ratio (q - offset), tau = ratio' (torque_constant * u)",
+        "    'ratio': (", *rows, "    ),",
+        f"    'offset': {d.offset!r},", f"    'torque_constant': {d.torque_constant!r},",
+        "}",
+    ]
+
+
+def _marks(spec: ModuleSpec) -> list[str]:
+    rows = ['"' + "".join("x" if mark else "." for mark in row) + '",' for row in spec.structure]
+    return wrap(" ".join(rows), WIDTH - 4, break_long_words=False)
+
+
+def literal(name: str, value: Any) -> list[str]:
+    """`name = value` as Python source, wrapped entry by entry."""
+    flat = f"{name} = {value!r}"
+    if len(flat) <= WIDTH or not value:
+        return [flat]
+    if isinstance(value, Mapping):
+        entries, opening, closing = [f"{k!r}: {v!r}" for k, v in value.items()], "{", "}"
+    else:
+        entries, opening, closing = [repr(v) for v in value], "(", ")"
+    return [f"{name} = {opening}", *packed(entries), closing]
+
+
+def packed(entries: Sequence[str], indent: str = "    ") -> list[str]:
+    """Entries separated by commas, as many on a line as fit."""
+    lines, line = [], indent
+    for entry in entries:
+        if len(line) + len(entry) + 1 > WIDTH and line.strip():
+            lines.append(line.rstrip())
+            line = indent
+        line += entry + ", "
+    return [*lines, line.rstrip()]
+
+
+def wrapped(text: str, indent: str, hanging: str | None = None) -> list[str]:
+    """Text broken at spaces."""
+    more = indent + "    " if hanging is None else hanging
+    return wrap(text, WIDTH, initial_indent=indent, subsequent_indent=more, break_long_words=False, break_on_hyphens=False)

@@ -1,0 +1,201 @@
+"""Graph to lines of Python: which nodes get a line of their own, what they are called, and how an expression is written.
+
+A node has a line if it has a name, or if it is used more than once; then it takes its hint, or a name made of its factors
+(C4DV23 = C4*DV23). Everything else is written inside its only user, so each operation of the graph stands in the text exactly once.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from symgen.derive.graph import ADD, CONST, COS, INV, MUL, POS, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
+from symgen.errors import SymgenError
+
+CALLS = {COS: "np.cos", SIN: "np.sin", SIGN: "np.sign", SQRT: "np.sqrt"}
+MAX_NAME = 32
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and the lines under it."""
+
+    title: str
+    lines: tuple[str, ...]
+
+
+class Text:
+    """The lines of one function: `sections`, then an expression for each output by `expression`."""
+
+    def __init__(self, outputs: Sequence[Scalar | int], headings: Sequence[tuple[int, str]], taken: Iterable[str]) -> None:
+        self.nodes = reachable(outputs)
+        self.uses: dict[int, int] = {}
+        for s in [x for node in self.nodes for x in node.operands] + [o for o in outputs if isinstance(o, Scalar)]:
+            self.uses[s.node.index] = self.uses.get(s.node.index, 0) + 1
+        self.taken = set(taken)
+        self.called: dict[int, str] = {}
+        for node in self.nodes:
+            if node.op == SYM:
+                self.called[node.index] = "np.pi" if node.value == "pi" else str(node.value)
+        self.named = {node.index for node in self.nodes if node.op not in (SYM, CONST) and (node.name or self.uses[node.index] > 1)}
+        self._assign_names()
+        self.sections = self._sections(headings)
+
+    @property
+    def inputs(self) -> set[str]:
+        """Names of the symbols that the outputs need."""
+        return {str(node.value) for node in self.nodes if node.op == SYM}
+
+    @property
+    def operations(self) -> tuple[int, int]:
+        """(multiplications, additions) in the text."""
+        return sum(n.op == MUL for n in self.nodes), sum(n.op == ADD for n in self.nodes)
+
+    @property
+    def trigonometry(self) -> tuple[int, int]:
+        """(sines, cosines) in the text."""
+        return sum(n.op == SIN for n in self.nodes), sum(n.op == COS for n in self.nodes)
+
+    def _assign_names(self) -> None:
+        for node in self.nodes:
+            if node.index in self.named and node.name:
+                self._call(node, node.name)
+        for node in self.nodes:
+            if node.index in self.named and node.index not in self.called:
+                self._call(node, node.hint or self._made_of(node))
+
+    def _call(self, node: Node, name: str) -> None:
+        if name in self.taken:
+            raise SymgenError(f"two quantities would be called {name}; rename the constant or parameter of that name in the robot file")
+        self.taken.add(name)
+        self.called[node.index] = name
+
+    def _made_of(self, node: Node) -> str:
+        name = self._words(node)
+        if len(name) > MAX_NAME or not name[0].isalpha():
+            name = "K" + re.sub(r"\W", "", name)[: MAX_NAME - 1]
+        while name in self.taken:
+            name += "b"
+        node.name_sign = 1
+        if node.op == MUL:  # the name says product of names, whatever signs those have
+            a, b = node.operands
+            node.name_sign = self._name_sign(a.node) * self._name_sign(b.node)
+        return name
+
+    def _words(self, node: Node) -> str:
+        if node.index in self.called:
+            return self.called[node.index].replace(".", "")
+        match node.op:
+            case "const":
+                return "x" + str(node.value).replace("/", "d")
+            case "mul":
+                words = sorted((self._words(x.node) for x in node.operands), key=lambda w: w.startswith("x"))
+                return "".join(words)
+            case "add":
+                a, b = node.operands
+                return self._words(a.node) + ("p" if b.sign > 0 else "m") + self._words(b.node)
+        return node.op + "".join(self._words(x.node) for x in node.operands)
+
+    def _sections(self, headings: Sequence[tuple[int, str]]) -> tuple[Section, ...]:
+        marks = [(0, "Inputs"), *headings]
+        sections: list[Section] = []
+        fixed = [n for n in self.nodes if n.index in self.named and n.fixed]
+        if fixed:
+            sections.append(Section("Constants", tuple(self._line(n) for n in fixed)))
+        angles = [n for n in self.nodes if n.index in self.named and not n.fixed and self._is_angle(n)]
+        if angles:
+            sections.append(Section("Trigonometry", tuple(self._line(n) for n in angles)))
+        done = {n.index for n in fixed + angles}
+        starts = [start for start, _ in marks]
+        by_mark: dict[int, list[str]] = {}
+        for node in self.nodes:
+            if node.index in self.named and node.index not in done:
+                by_mark.setdefault(bisect_right(starts, node.index) - 1, []).append(self._line(node))
+        for k, lines in by_mark.items():
+            if sections and sections[-1].title == marks[k][1]:
+                sections[-1] = Section(marks[k][1], sections[-1].lines + tuple(lines))
+            else:
+                sections.append(Section(marks[k][1], tuple(lines)))
+        return tuple(sections)
+
+    def _is_angle(self, node: Node) -> bool:
+        return node.op in (COS, SIN) or (node.name is not None and node.name.startswith("th"))
+
+    def _line(self, node: Node) -> str:
+        return f"{self.called[node.index]} = {self._body(Scalar(None, node, self._name_sign(node)))}"  # type: ignore[arg-type]
+
+    def _name_sign(self, node: Node) -> int:
+        return node.name_sign if node.index in self.named else 1
+
+    # --- expressions ---
+
+    def expression(self, s: Scalar | int) -> str:
+        """Text of an output."""
+        if isinstance(s, int):
+            return str(float(s))
+        return self._operand(s)
+
+    def _operand(self, s: Scalar) -> str:
+        """Text of a named node by name, of another by its body."""
+        if s.node.index in self.called:
+            return ("-" if s.sign * self._name_sign(s.node) < 0 else "") + self.called[s.node.index]
+        return self._body(s)
+
+    def _body(self, s: Scalar) -> str:
+        node = s.node
+        match node.op:
+            case "const":
+                return ("-" if s.sign < 0 else "") + number(node.value)
+            case "add":
+                return self._sum(s)
+            case "mul":
+                return self._product(s)
+            case "pos":
+                (x,) = node.operands
+                inner = self._operand(x if x.sign > 0 else -x)
+                text = f"np.maximum({inner}, 0.0)" if x.sign > 0 else f"np.minimum({inner}, 0.0)"
+                return text if (s.sign > 0) == (x.sign > 0) else "-" + text
+            case "inv":
+                return ("-" if s.sign < 0 else "") + f"1/{self._factor(node.operands[0])}"
+        return ("-" if s.sign < 0 else "") + f"{CALLS[node.op]}({self._operand(node.operands[0])})"
+
+    def _sum(self, s: Scalar) -> str:
+        terms = self._terms(s)
+        terms.sort(key=lambda t: t.startswith("-"))  # a positive term first saves a negation
+        text = terms[0]
+        for term in terms[1:]:
+            text += f" - {term[1:]}" if term.startswith("-") else f" + {term}"
+        return text
+
+    def _terms(self, s: Scalar) -> list[str]:
+        terms: list[str] = []
+        for x in s.node.operands:
+            x = x if s.sign > 0 else -x
+            inline = x.node.op == ADD and x.node.index not in self.called
+            terms += self._terms(x) if inline else [self._operand(x)]
+        return terms
+
+    def _product(self, s: Scalar) -> str:
+        sign, factors = s.sign, []
+        stack = [x for x in s.node.operands]
+        a, b = stack
+        if a.node is b.node:
+            square = f"{self._factor(Scalar(None, a.node, self._name_sign(a.node)))}**2"  # type: ignore[arg-type]
+            return ("-" if sign < 0 else "") + square
+        for x in sorted(stack, key=lambda x: not x.node.fixed):
+            name_sign = self._name_sign(x.node) if x.node.index in self.called else 1
+            sign *= x.sign * name_sign
+            factors.append(self._factor(Scalar(None, x.node, name_sign)))  # type: ignore[arg-type]
+        return ("-" if sign < 0 else "") + "*".join(factors)
+
+    def _factor(self, s: Scalar) -> str:
+        text = self._operand(s)
+        return f"({text})" if s.node.index not in self.called and s.node.op in (ADD, INV) or text.startswith("-") else text
+
+
+def number(c: Fraction) -> str:
+    """A constant as Python reads it back."""
+    return str(c.numerator) if c.denominator == 1 else repr(float(c))

@@ -1,0 +1,94 @@
+"""From a module specification to text: the only place where jinja2 lays out an emitted module."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from textwrap import wrap
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from symgen.description.robot import FIXED, Robot
+from symgen.emit.header import header, literal, packed, tables
+from symgen.emit.printers import Section
+from symgen.emit.spec import WIDTH, Function, ModuleSpec
+from symgen.regroup.regrouping import formula
+from symgen.version import VERSION
+
+BLOCK = 4096
+SUMMARIES = {
+    "regressor": ("q, qd, qdd, D", "Fill D, shape ({b}, {n}, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: ({n}, N)."),
+    "inverse_dynamics": ("q, qd, qdd, GAM, X", "Fill GAM, shape ({n}, N). q, qd, qdd: ({n}, N)."),
+    "inertia_matrix": ("q, A, X", "Fill A, shape ({n}, {n}, N): column i is Gamma for a unit acceleration of joint i from rest. q: ({n}, N)."),
+    "bias": ("q, qd, GAM, X", "Fill GAM, shape ({n}, N), for qdd = 0. q, qd: ({n}, N)."),
+    "gravity": ("q, GAM, X", "Fill GAM, shape ({n}, N), at rest. q: ({n}, N)."),
+    "frame_poses": ("q, T", "Fill T, shape ({frames}, 4, 4, N). q: ({n}, N)."),
+}
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("symgen.emit"), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
+    )
+
+
+def render(spec: ModuleSpec, *, command: str | None = None) -> str:
+    """The NumPy module of `spec`. Same robot file, same version: same bytes."""
+    robot, regrouping = spec.robot, spec.regrouping
+    constants = list(robot.constants)
+    defaults = "".join(f", {name}={robot.constants[name]!r}" for name in constants)
+    sizes = {"n": len(robot.joints), "b": len(regrouping), "frames": len(robot.frames), "p": len(robot.parameters)}
+    context = {
+        **sizes,
+        "title": plain(robot.title or robot.name), "file": plain(robot.file or robot.name), "sha256": robot.sha256,
+        "version": VERSION, "command": plain(command or robot.file or robot.name), "size": BLOCK,
+        "header": [plain(line) for line in header(spec)], "tables": [*tables(spec), *_paths(robot)],
+        "constant_entries": spec.constant_entries,
+        "constants": "".join(f", {name}" for name in constants),
+        "passed": "".join(f", {name}={name}" for name in constants),
+        "defaults": defaults, "keywords": ", *" + defaults if constants else "",
+        "unpack": _unpack(robot), "formulas": _formulas(spec), "packed": packed(list(regrouping.names)),
+        "blocks": [_block(name, getattr(spec, name), sizes, constants) for name in SUMMARIES],
+    }
+    return _environment().get_template("module.py.jinja").render(context)
+
+
+def plain(text: str) -> str:
+    """Text that cannot end a docstring."""
+    return " ".join(text.replace("\\", "/").replace('"""', "'''").split(" ")).replace("\r", " ").replace("\n", " ")
+
+
+def _block(name: str, function: Function, sizes: dict[str, int], constants: list[str]) -> dict[str, object]:
+    arguments, summary = SUMMARIES[name]
+    sections = function.sections or (Section("Nothing acts", ("pass",)),)
+    return {
+        "name": f"_{name}_block", "arguments": ", ".join([arguments, *constants]), "summary": summary.format(**sizes), "sections": sections,
+    }
+
+
+def _unpack(robot: Robot) -> list[str]:
+    text = ", ".join(robot.parameters) + ("," if len(robot.parameters) == 1 else "")
+    return ["(", *(f"    {line}" for line in wrap(text, WIDTH - 8)), ") = standard"]
+
+
+def _formulas(spec: ModuleSpec) -> list[str]:
+    return [f"{b.name} = {_code(formula(b.combination))}" for b in spec.regrouping.base if b.name != b.own]
+
+
+def _code(text: str) -> str:
+    """A formula of the common grammar as NumPy source."""
+    return re.sub(r"\b(cos|sin|sqrt)\(|\bpi\b", lambda match: f"np.{match.group(0)}", text)
+
+
+def _paths(robot: Robot) -> list[str]:
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the actuated ones move them."""
+    from symgen.derive.loops import Closure
+
+    closure = Closure(robot)
+    column = {j: k for k, j in enumerate(robot.joints)}
+    paths = {}
+    for f in robot.frames:
+        moving = [robot.frame(i) for i in robot.path(f.j) if robot.frame(i).sigma != FIXED]
+        paths[f.j] = tuple((m.j, m.sigma, tuple((column[i], float(g.value(robot.constants))) for i, g in closure.row[m.j].items())) for m in moving)
+    return literal("_PATHS", paths)
