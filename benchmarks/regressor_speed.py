@@ -6,7 +6,7 @@ One process pinned to one core, one BLAS thread, CPU time. Before timing, every 
 columns) is compared with D K, K = d base_parameters / d standard. Each round runs every contender once, in rotated order and each
 for about the same time; the ratio is taken per round and given as median [range]. All write into buffers already in use:
 
-    emitted      regressor(q, qd, qdd, out=store)                all base columns, friction and offsets included
+    emitted      regressor(q, qd, qdd, out=store)                all base columns, then those of the inertial parameters and Ia alone
     pinocchio    W[k] = computeJointTorqueRegressor(...)         10 standard columns per link; the product to base columns is not counted
     calls        the same calls without keeping the result
     fill         the same store filled with a constant; `nonzero`: only its rows that are not identically zero
@@ -26,7 +26,9 @@ import sys
 import time
 import tracemalloc
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any
 
@@ -42,7 +44,9 @@ sys.path.insert(0, str(ROOT / "tests"))
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_state
 
+from symgen.description.robot import Robot
 from symgen.description.yaml import load_robot
+from symgen.emit import generate_module
 
 SAMPLES = 7103  # not a multiple of 8
 SPENT = 0.1  # s of CPU that one contender uses in a round
@@ -124,18 +128,26 @@ def fill_rows(rows: list[Array]) -> None:
         row.fill(1.0)
 
 
-def small(name: str, module: ModuleType, rounds: int) -> None:
-    robot = load_robot(name)
+def without_friction(robot: Robot) -> ModuleType:
+    """The module of the inertial parameters and Ia alone: nearest to what pinocchio computes."""
+    inertia = tuple(e for e in robot.elements if e.kind == "inertia")
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"{robot.name}.py"
+        path.write_text(generate_module(replace(robot, elements=inertia, values={})), encoding="utf-8")
+        return load_module(path)
+
+
+def small(title: str, robot: Robot, module: ModuleType, rounds: int) -> None:
     states = random_state(robot, SAMPLES, seed=7)
     oracle = PinocchioModel(robot)
     loop, out = PinocchioLoop(oracle, states), module.store(SAMPLES)
     loop()
     defect = compare(module, oracle, module.regressor(*states, out=out), loop.W)
     N, n, b = module.regressor(*states, out=out).shape
-    print(f"\n{name}: {N} samples, {n} joints, {b} base columns ({int(np.sum(module.STRUCTURE))} of {n * b} entries not zero)")
+    print(f"\n{title}: {N} samples, {n} joints, {b} base columns ({int(np.sum(module.STRUCTURE))} of {n * b} entries not zero)")
     print(f"  largest defect against pinocchio, all {loop.W.size} entries: {defect:.1e} of the column")
     if defect > TOLERANCE:
-        raise SystemExit(f"{name}: the regressors differ; nothing was timed")
+        raise SystemExit(f"{title}: the regressors differ; nothing was timed")
     plain = np.ones((b, n, N))
     rows = [plain[c, j] for c, j in zip(*np.nonzero(module.STRUCTURE), strict=True)]
     contenders: dict[str, Callable[[], object]] = {
@@ -193,7 +205,9 @@ def main() -> None:
     print(f"CPU time on one core, {settings.rounds} interleaved rounds, ratios as median [range]")
     modules = {name: load_module(settings.modules / f"{name}.py") for name in settings.robots}
     for name, module in modules.items():
-        small(name, module, settings.rounds)
+        robot = load_robot(name)
+        small(f"{name}, all columns", robot, module, settings.rounds)
+        small(f"{name}, inertial and Ia", robot, without_friction(robot), settings.rounds)
     for name, module in modules.items():
         if settings.large:
             large(name, module, settings.large, settings.rounds)
