@@ -85,7 +85,8 @@ def cestac(
     columns : essential names where they are known; default: those of `study` on this record. Unused unless study.cestac.columns is "essential".
     drives : motor side; default: DRIVES of the model.
     constants : values in place of the robot file's.
-    workers : processes, 0 for this one (`runtime.processes`); the results do not depend on it.
+    workers : processes, 0 for this one (`runtime.processes`); the results do not depend on it. A script that asks for processes needs the usual
+        `if __name__ == "__main__"`.
     progress : called with every finished run, the number of runs done and their total.
     finished : runs of an interrupted or shorter study with the same settings, not repeated.
     """

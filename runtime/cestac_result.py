@@ -14,7 +14,8 @@ and for the residual, where rho_LS = Y - W X_LS, two readings of rho_CESTAC and 
 As printed, (22) grows to hundreds of per cent where Table 3 says about ten; the increase relative to ||Y|| has the printed order.
 
 Verdict of the chapter: all %e and %e(rho) below 1 %: practically unbiased; above 5 %: biased; between: doubtful. Parameters whose own %sigma (11)
-is large do not decide; the result says which ones did.
+is large do not decide; the result says which ones did. Section 4.1.4 calls the residual the best single indicator, as it sees the whole model:
+`residual_verdict` applies the same two limits to its increase alone.
 """
 
 from __future__ import annotations
@@ -80,7 +81,7 @@ class LevelResult:
 
     mean, sigma, relative_sigma, e : eqs. (18)-(21).   half_width : of the Student interval of the mean, SI; `half_width_percent` of |X_LS|.
     e_rho, e_rho_own, increase, increase_own : the residual, in %; see the head of this module.
-    verdict : "unbiased", "doubtful" or "biased".   decided_by : %e of what decided, by name ("rho" for the residual), largest first.
+    verdict : "unbiased", "doubtful" or "biased"; residual_verdict : the same of `increase` alone.   decided_by : %e of what decided, by name ("rho" for the residual), largest first.
     runs_needed : runs after which the intervals of the deciding parameters are narrower than 1 % of X_LS.
     """
 
@@ -97,6 +98,7 @@ class LevelResult:
     increase: float
     increase_own: float
     verdict: str
+    residual_verdict: str
     decided_by: Mapping[str, float]
     runs_needed: int
     message: str
@@ -134,12 +136,13 @@ class Cestac:
         lines: list[Sequence[str]] = [("parameter", "LS", *(r.level.label for r in results))]
         for i, name in enumerate(self.names):
             lines.append((name, f"{self.reference.X[i]:.4g}", *(f"{r.mean[i]:.4g}" for r in results)))
-        lines.append(("largest %e", "", *(f"{max(r.decided_by.values(), default=np.nan):.2f}" for r in results)))
+        lines.append(("largest error %", "", *(f"{max(r.decided_by.values(), default=np.nan):.2f}" for r in results)))
         lines.append(("%e(rho), printed", "", *(f"{r.e_rho:.2f}" for r in results)))
         lines.append(("%e(rho), own W", "", *(f"{r.e_rho_own:.2f}" for r in results)))
         lines.append(("increase / |Y| %", "", *(f"{r.increase:.2f}" for r in results)))
         lines.append(("increase, own W %", "", *(f"{r.increase_own:.2f}" for r in results)))
         lines.append(("verdict", "", *(r.verdict for r in results)))
+        lines.append(("verdict of increase", "", *(r.residual_verdict for r in results)))
         notes = "\n".join(f"{r.level.label}: {r.message}" for r in results)
         return f"{aligned(lines)}\n\n{notes}"
 
@@ -212,6 +215,7 @@ def level_result(level: Level, runs: Sequence[Run], measured: Observation, refer
         increase=100 * (rho - rho_ls) / norm_Y,
         increase_own=100 * (own - rho_ls) / norm_Y,
         verdict=verdict,
+        residual_verdict=_judged(100 * abs(rho - rho_ls) / norm_Y),
         decided_by=decided_by,
         runs_needed=needed,
         message=_message(verdict, decided_by, reference, decisive, N, float(half * spread[decisive].max(initial=0.0)), needed),
@@ -228,11 +232,16 @@ def runs_needed(spread: float) -> int:
 def _verdict(errors: Mapping[str, float]) -> tuple[str, dict[str, float]]:
     """Verdict, and the errors that decided it, largest first; the largest one alone when all are negligible."""
     ordered = sorted(errors.items(), key=lambda item: -item[1])
-    if ordered[0][1] < NEGLIGIBLE:
-        return "unbiased", dict(ordered[:1])
-    if ordered[0][1] > BIASED:
-        return "biased", {name: value for name, value in ordered if value > BIASED}
-    return "doubtful", {name: value for name, value in ordered if value >= NEGLIGIBLE}
+    verdict = _judged(ordered[0][1])
+    if verdict == "unbiased":
+        return verdict, dict(ordered[:1])
+    limit = BIASED if verdict == "biased" else NEGLIGIBLE
+    return verdict, {name: value for name, value in ordered if value >= limit}
+
+
+def _judged(error: float) -> str:
+    """Verdict of one error, in %."""
+    return "unbiased" if error < NEGLIGIBLE else "biased" if error > BIASED else "doubtful"
 
 
 def _message(

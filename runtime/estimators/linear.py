@@ -126,7 +126,12 @@ def assemble(
     share = 1 - fit.rank / system.raw.rows
     per_joint = tuple(
         JointFit(
-            label, joint.rows, norm, _percent(norm, of), norm / np.sqrt(joint.rows * share) if share > 0 and joint.rows else np.nan, scale
+            label,
+            joint.rows,
+            norm,
+            _percent(norm, of),
+            float(norm / np.sqrt(joint.rows * share)) if share > 0 and joint.rows else np.nan,
+            scale,
         )
         for label, joint, norm, of, scale in zip(labels, system.raw.joints, norms, measured, system.scales, strict=True)
     )
