@@ -36,12 +36,13 @@ DUNDERS = frozenset(
         "__contains__",
         "__slots__",
         "__post_init__",
+        "__array_finalize__",
     }
 )
 BUILTINS = _words(
     "ArithmeticError AttributeError Exception False IndexError KeyError None NotImplementedError RuntimeError True TypeError ValueError ZeroDivisionError "
-    "abs all any bool bytes callable dict divmod enumerate filter float frozenset hash int isinstance issubclass iter len list map max min next object "
-    "property range repr reversed round set slice sorted staticmethod str sum super tuple zip"
+    "abs all any bool bytes callable dict divmod enumerate filter float frozenset hasattr hash int isinstance issubclass iter len list map max min next object "
+    "property range repr reversed round set slice sorted staticmethod str sum super tuple type zip"
 )
 NUMPY = _words(
     "abs absolute add all allclose any arange arccos arccosh arcsin arcsinh arctan arctan2 arctanh array array_equal asarray ascontiguousarray asfortranarray "
@@ -54,7 +55,7 @@ NUMPY = _words(
     "zeros zeros_like"
 )
 LINALG = frozenset({"LinAlgError", "cholesky", "cond", "det", "eigvalsh", "inv", "lstsq", "norm", "qr", "solve", "svd"})
-HIDDEN = (frozenset(dir(builtins)) - BUILTINS) | {"np"}  # open, eval, exec, getattr, type ...: neither used nor redefined
+HIDDEN = (frozenset(dir(builtins)) - BUILTINS) | {"np"}  # open, eval, exec, getattr, vars ...: neither used nor redefined
 FILES = frozenset(
     {"tofile", "dump", "dumps", "ctypes", "ctypeslib", "format", "format_map"}
 )  # attributes that reach files, memory or text templates

@@ -3,8 +3,8 @@
     median -> Butterworth forward and backward -> central differences        q  -> q, qd, qdd
     Chebyshev I forward and backward -> one sample in n_d, eq. (13)          Y and every column of W
 
-Second-order sections throughout: the (b, a) form of the decimation filter is wrong by 2e-3 at a factor of 40 and diverges at 100. Both ends are
-extended by odd reflection; MATLAB's filtfilt takes 3*(filter length - 1) samples, scipy's default 3*(filter length).
+Never the (b, a) form: for decimation it is wrong by 2e-3 at a factor of 40 and diverges at 100. Both ends are extended by odd reflection;
+MATLAB's filtfilt takes 3*(filter length - 1) samples, scipy's default 3*(filter length).
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ from math import floor
 
 import numpy as np
 from scipy import ndimage
-from scipy.signal import butter, cheby1, sosfiltfilt
+from scipy.signal import butter, sosfiltfilt
 
+from runtime.decimation import CUTOFF, ORDER, decimate
 from runtime.errors import InputError
 from runtime.study import Decimate, Lowpass, Signals
 
 Array = np.ndarray
-
-CHEBYSHEV_ORDER, RIPPLE, CUTOFF = 8, 0.05, 0.8  # MATLAB's and scipy's decimate: dB, fraction of the new Nyquist frequency
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,24 +100,27 @@ def decimated(x: Array, factor: int, settings: Decimate | None) -> Array:
     """
     if factor == 1 or settings is None:
         return x
-    sos = cheby1(CHEBYSHEV_ORDER, RIPPLE, CUTOFF / factor, output="sos")
-    pad = 3 * CHEBYSHEV_ORDER if settings.padding == "matlab" else 3 * (CHEBYSHEV_ORDER + 1)
-    return zero_phase(sos, x, pad, axis=-1)[..., kept_samples(x.shape[-1], factor, settings.phase)]
+    pad = 3 * ORDER if settings.padding == "matlab" else 3 * (ORDER + 1)
+    _long_enough(x.shape[-1], pad)
+    first = int(kept_samples(x.shape[-1], factor, settings.phase)[0])
+    rows = np.ascontiguousarray(x).reshape(-1, x.shape[-1])
+    return decimate(rows, factor, first, pad).reshape(*x.shape[:-1], -1)
 
 
 def zero_phase(sos: Array, x: Array, pad: int, axis: int) -> Array:
     """Filter forward and backward after odd reflection of `pad` samples at each end, started in the steady state of the first value."""
-    if x.shape[axis] <= pad:
-        raise InputError(
-            f"{x.shape[axis]} samples; this zero-phase filter needs more than {pad}, use a longer record or window, or a lower order"
-        )
+    _long_enough(x.shape[axis], pad)
     return np.asarray(sosfiltfilt(sos, x, axis=axis, padtype="odd", padlen=pad))
 
 
+def _long_enough(samples: int, pad: int) -> None:
+    if samples <= pad:
+        raise InputError(
+            f"{samples} samples; this zero-phase filter needs more than {pad}, use a longer record or window, or a lower order"
+        )
+
+
 __all__ = [
-    "CHEBYSHEV_ORDER",
-    "CUTOFF",
-    "RIPPLE",
     "Decimate",
     "Lowpass",
     "Signals",
