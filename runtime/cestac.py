@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -232,4 +233,4 @@ def _file(model: GeneratedModel | str) -> str:
     path = model if isinstance(model, str) else getattr(model, "__file__", None)
     if not path:
         raise InputError("this model was not loaded from a file, which other processes need; use workers=0")
-    return str(path)
+    return str(Path(path).resolve())
