@@ -7,7 +7,7 @@ wls   least squares weighted by joint      runtime/estimators/wls.py
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from runtime.errors import SettingsError
 from runtime.estimate import Estimate
@@ -17,7 +17,19 @@ from runtime.model import GeneratedModel
 from runtime.observation import Observation
 from runtime.study import EstimateSettings
 
-__all__ = ["LINEAR", "estimate", "linear_system"]
+T = TypeVar("T")
+
+__all__ = ["LINEAR", "METHODS", "estimate", "linear_system"]
+
+
+class Estimator(Protocol):
+    """An estimation method."""
+
+    def __call__(
+        self, observation: Observation, settings: EstimateSettings, *, model: GeneratedModel | None, provenance: Mapping[str, Any] | None
+    ) -> Estimate:
+        """The Estimate of one observation."""
+
 
 LINEAR: Mapping[str, Callable[[Observation, EstimateSettings], System]] = {"ols": ols.system, "wls": wls.system}
 """Methods that are one least-squares problem in the rows of the observation."""
@@ -25,9 +37,19 @@ LINEAR: Mapping[str, Callable[[Observation, EstimateSettings], System]] = {"ols"
 
 def linear_system(observation: Observation, settings: EstimateSettings) -> System:
     """The factored rows as the method of `settings` weighs them; raises SettingsError for a method that is not one linear system."""
-    if settings.method not in LINEAR:
-        raise SettingsError(f"{settings.method!r} cannot be used here; expected {' or '.join(LINEAR)}", path=("estimate", "method"))
-    return LINEAR[settings.method](observation, settings)
+    return _known(LINEAR, settings.method)(observation, settings)
+
+
+def linear_estimate(
+    observation: Observation, settings: EstimateSettings, *, model: GeneratedModel | None, provenance: Mapping[str, Any] | None
+) -> Estimate:
+    """Solve the system of a linear method."""
+    system = linear_system(observation, settings)
+    return assemble(system, system.solve(), model=model, provenance=provenance)
+
+
+METHODS: Mapping[str, Estimator] = dict.fromkeys(LINEAR, linear_estimate)
+"""Every method, by the name that `estimate.method` of a study gives it."""
 
 
 def estimate(
@@ -42,5 +64,11 @@ def estimate(
     model : gives units, joint numbers and the hash of the robot file.
     provenance : further entries for Estimate.provenance (a seed, the study file).
     """
-    system = linear_system(observation, settings or EstimateSettings())
-    return assemble(system, system.solve(), model=model, provenance=provenance)
+    settings = settings or EstimateSettings()
+    return _known(METHODS, settings.method)(observation, settings, model=model, provenance=provenance)
+
+
+def _known(methods: Mapping[str, T], name: str) -> T:
+    if name not in methods:
+        raise SettingsError(f"{name!r} is not available here; expected {' or '.join(methods)}", path=("estimate", "method"))
+    return methods[name]
