@@ -6,7 +6,7 @@ the signals, then place them. The regressor is evaluated in blocks on one reused
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +23,12 @@ PROBES = 64  # random states that tell signals apart
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Where the signals stand: store[k[m], j[m]] = sign[m] * signal[which[m]]; signal s is first met at entry source[s]."""
+    """Where the signals stand: model store[k[m], j[m]] = sign[m] * signal[which[m]]; signal s is first met at entry source[s].
 
+    row : row of each entry in the wanted store; row = k where every column is wanted.
+    """
+
+    row: Array
     k: Array
     j: Array
     which: Array
@@ -33,13 +37,22 @@ class Entries:
 
 
 def decimated_columns(
-    model: GeneratedModel, states: States, factor: int, settings: Decimate | None, constants: Mapping[str, float]
+    model: GeneratedModel,
+    states: States,
+    factor: int,
+    settings: Decimate | None,
+    constants: Mapping[str, float],
+    columns: Sequence[int] | None = None,
 ) -> Array:
-    """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of the window."""
-    entries = distinct_entries(model, constants)
+    """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of the window.
+
+    columns : numbers of the columns wanted, in the order wanted; default: all b. Others are not filtered.
+    """
+    wanted = np.arange(len(model.BASE_PARAMETERS)) if columns is None else np.asarray(columns, dtype=int)
+    entries = distinct_entries(model, constants, wanted)
     signals = decimated(signals_of(model, states, entries, constants), factor, settings)
-    store = np.zeros((*np.shape(model.STRUCTURE), signals.shape[-1]))
-    store[entries.k, entries.j] = entries.sign[:, None] * signals[entries.which]
+    store = np.zeros((len(wanted), len(model.JOINTS), signals.shape[-1]))
+    store[entries.row, entries.j] = entries.sign[:, None] * signals[entries.which]
     return store
 
 
@@ -59,21 +72,23 @@ def signals_of(model: GeneratedModel, states: States, entries: Entries, constant
     return signals
 
 
-def distinct_entries(model: GeneratedModel, constants: Mapping[str, float]) -> Entries:
-    """Entries of STRUCTURE grouped by equal values, up to the sign, at random states.
+def distinct_entries(model: GeneratedModel, constants: Mapping[str, float], columns: Array | None = None) -> Entries:
+    """Entries of STRUCTURE in the columns (default: all) grouped by equal values, up to the sign, at random states.
 
     The emitted text copies equal rows, so equal signals agree in every bit; different ones do not agree at 64 random states. Where the random
     states are out of reach (loops that do not close), every entry stands for itself.
     """
-    k, j = np.nonzero(np.asarray(model.STRUCTURE))
+    columns = np.arange(len(model.BASE_PARAMETERS)) if columns is None else columns
+    row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])
+    k = columns[row]
     rng = np.random.default_rng(0)
     q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))
     with np.errstate(all="ignore"):
         values = model.regressor(q, qd, qdd, out=model.store(PROBES), **constants).transpose(2, 1, 0)[k, j]
     if not np.isfinite(values).all():
         every = np.arange(len(k))
-        return Entries(k, j, every, np.ones(len(k)), every)
+        return Entries(row, k, j, every, np.ones(len(k)), every)
     sign = np.where(values[:, 0] < 0, -1.0, 1.0)
     _, source, which = np.unique(sign[:, None] * values + 0.0, axis=0, return_index=True, return_inverse=True)
     which = which.reshape(-1)
-    return Entries(k, j, which, sign * sign[source][which], source)
+    return Entries(row, k, j, which, sign * sign[source][which], source)

@@ -78,10 +78,7 @@ class Observation:
 
     def columns(self, names: Sequence[str]) -> Observation:
         """The same rows with the named columns alone, in the order given."""
-        unknown = [name for name in names if name not in self.names]
-        if unknown:
-            raise InputError(f"no column {', '.join(unknown)}; there are {', '.join(self.names)}")
-        return replace(self, W=np.asfortranarray(self.W[:, [self.names.index(name) for name in names]]), names=tuple(names))
+        return replace(self, W=np.asfortranarray(self.W[:, _numbers(names, self.names)]), names=tuple(names))
 
     def where(self, mask: Array) -> Observation:
         """The rows where `mask`, bool of shape (r,), is true."""
@@ -121,17 +118,24 @@ class Selection:
 
 
 def observe(
-    model: GeneratedModel, record: Record, study: Study, *, keep: Array | None = None, constants: Mapping[str, float] | None = None
+    model: GeneratedModel,
+    record: Record,
+    study: Study,
+    *,
+    keep: Array | None = None,
+    columns: Sequence[str] | None = None,
+    constants: Mapping[str, float] | None = None,
 ) -> Observation:
     """Filter, differentiate, evaluate the regressor, decimate, and leave rows out.
 
     keep : bool, shape (N,) or (N, n): samples (and joints) that may be used, e.g. from a simulated velocity.
+    columns : names of the columns wanted; default: all.
     constants : values in place of the robot file's, for the model's keyword arguments.
     """
     states = filtered_states(record.q, record.rate, study.signals)
     selection = select_rows(record, states.qd, study.signals, study.rows, keep=keep)
     torque = decimated_torque(record.tau, selection)
-    return observation_from_states(model, states, torque, selection, files=record.files, constants=constants)
+    return observation_from_states(model, states, torque, selection, files=record.files, columns=columns, constants=constants)
 
 
 def select_rows(record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None) -> Selection:
@@ -173,21 +177,27 @@ def observation_from_states(
     selection: Selection,
     *,
     files: Mapping[str, str] | None = None,
+    columns: Sequence[str] | None = None,
     constants: Mapping[str, float] | None = None,
 ) -> Observation:
-    """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated before."""
+    """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated before.
+
+    columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
+    """
     check_states(model, states.q, states.qd, states.qdd)
     n, K = selection.mask.shape
     if torque.shape != (n, K) or len(model.JOINTS) != n:
         raise InputError(f"torque {torque.shape}, model {model.NAME} with {len(model.JOINTS)} joints; expected {(n, K)} and {n} joints")
-    columns = decimated_columns(model, states[selection.samples], selection.factor, selection.signals.decimate, constants or {})
+    names = tuple(model.BASE_PARAMETERS) if columns is None else tuple(columns)
+    numbers = _numbers(names, model.BASE_PARAMETERS)
+    store = decimated_columns(model, states[selection.samples], selection.factor, selection.signals.decimate, constants or {}, numbers)
     mask = selection.mask.ravel()
     settings = {"signals": to_mapping(selection.signals), "rows": to_mapping(selection.rows), "factor": selection.factor}
     return Observation(
-        W=np.compress(mask, columns.reshape(len(columns), n * K), axis=1).T,
+        W=np.compress(mask, store.reshape(len(names), n * K), axis=1).T,
         Y=torque.ravel()[mask],
         rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
-        names=tuple(model.BASE_PARAMETERS),
+        names=names,
         t=np.tile(selection.t, n)[mask],
         record=np.zeros(int(mask.sum()), dtype=int),
         rate=selection.rate,
@@ -216,7 +226,7 @@ def stack(observations: Sequence[Observation]) -> Observation:
         names=first.names,
         t=np.concatenate([o.t[rows] for o, rows, _ in order]),
         record=np.concatenate([o.record[rows] + k for o, rows, k in order]),
-        rate=first.rate,
+        rate=max(o.rate for o in observations),
         dropped={
             reason: tuple(sum(o.dropped.get(reason, (0,) * first.n)[j] for o in observations) for j in range(first.n))
             for reason in first.dropped
@@ -226,6 +236,13 @@ def stack(observations: Sequence[Observation]) -> Observation:
         else {"records": [o.settings for o in observations]},
         files={name: value for o in observations for name, value in o.files.items()},
     )
+
+
+def _numbers(names: Sequence[str], among: Sequence[str]) -> list[int]:
+    unknown = [name for name in names if name not in among]
+    if unknown:
+        raise InputError(f"no column {', '.join(unknown)}; there are {', '.join(among)}")
+    return [list(among).index(name) for name in names]
 
 
 def _window(record: Record, rows: Rows) -> slice:

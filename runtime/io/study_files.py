@@ -11,11 +11,30 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from runtime.errors import InputError, SettingsError
-from runtime.study import Study, study_from_mapping
+from runtime.io.datasets import DATASETS, dataset_study
+from runtime.io.table import READERS
+from runtime.study import RecordSettings, Study, study_from_mapping
 
 LONGEST = 1_000_000  # characters
 DEEPEST = 50  # levels; also stops an alias that contains itself
 LARGEST = 100_000  # values, aliases expanded
+
+
+def study_of(record: str) -> tuple[Study, Path]:
+    """The Study that a name on a command line means, and the folder its files are relative to.
+
+    record : a dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side).
+    """
+    path = Path(record)
+    if record in DATASETS:
+        return study_from_mapping(dataset_study(record)), Path()
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return load_study(path), path.parent
+    if any(suffix.lower() in READERS for suffix in path.suffixes):
+        return Study(record=(RecordSettings(files=(path.name,)),)), path.parent
+    raise InputError(
+        f"no record {record!r}; expected a dataset ({', '.join(DATASETS)}), a study file (.yaml) or a measured file ({', '.join(READERS)})"
+    )
 
 
 def load_study(path: Path) -> Study:

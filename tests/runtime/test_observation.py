@@ -75,7 +75,9 @@ def test_opposite_and_constant_signals():
         return S.transpose(2, 1, 0)
 
     structure = np.array([[1, 1], [1, 0], [0, 1], [1, 0]], dtype=bool)
-    model = types.SimpleNamespace(JOINTS=(1, 2), STRUCTURE=structure, store=lambda N: np.zeros((4, 2, N)), regressor=regressor)
+    model = types.SimpleNamespace(
+        JOINTS=(1, 2), BASE_PARAMETERS=tuple("ABCD"), STRUCTURE=structure, store=lambda N: np.zeros((4, 2, N)), regressor=regressor
+    )
     entries = distinct_entries(model, {})
     assert len(entries.source) == 3  # qd1, 1 and sign(qd1)
     qd = np.random.default_rng(0).normal(size=(300, 2))
@@ -94,7 +96,11 @@ def test_states_out_of_reach_are_not_merged():
         return S.transpose(2, 1, 0)
 
     model = types.SimpleNamespace(
-        JOINTS=(1,), STRUCTURE=np.ones((2, 1), dtype=bool), store=lambda N: np.zeros((2, 1, N)), regressor=regressor
+        JOINTS=(1,),
+        BASE_PARAMETERS=("A", "B"),
+        STRUCTURE=np.ones((2, 1), dtype=bool),
+        store=lambda N: np.zeros((2, 1, N)),
+        regressor=regressor,
     )
     assert len(distinct_entries(model, {}).source) == 2
 
@@ -156,6 +162,15 @@ def test_steps_of_a_resolution_study(record):
 def test_constants_in_place_of_the_robot_file(record):
     a, b = observe(planar, record, study()), observe(planar, record, study(), constants={"g": 0.0})
     assert np.linalg.norm(a.W[:, 1]) > 0 and not b.W[:, 1].any()
+
+
+def test_wanted_columns_alone(record):
+    names = ["FS2", "ZZ2", "ZZ1R"]
+    some, every = observe(planar, record, study(), columns=names), observe(planar, record, study())
+    np.testing.assert_allclose(some.W, every.columns(names).W, rtol=0, atol=1e-13 * np.abs(every.W).max())  # sums in another order
+    assert some.names == tuple(names)
+    with pytest.raises(InputError, match="no column FV9"):
+        observe(planar, record, study(), columns=["FV9"])
 
 
 def test_no_filters_at_all(record):

@@ -7,7 +7,7 @@ import pytest
 from runtime.arithmetic import number
 from runtime.errors import InputError, SettingsError
 from runtime.io.datasets import DATASETS, dataset_study
-from runtime.io.study_files import load_study, study_from_text
+from runtime.io.study_files import load_study, study_from_text, study_of
 from runtime.study import Study, study_from_mapping, to_mapping
 
 DESIGN = """
@@ -130,6 +130,16 @@ def test_load_study(tmp_path):
     assert load_study(tmp_path / "arm.yaml") == study_from_text(DESIGN)
     with pytest.raises(InputError, match="cannot be read"):
         load_study(tmp_path / "none.yaml")
+
+
+def test_record_on_a_command_line(tmp_path):
+    (tmp_path / "arm.yaml").write_text(DESIGN, encoding="utf-8")
+    assert study_of(str(tmp_path / "arm.yaml")) == (study_from_text(DESIGN), tmp_path)
+    assert study_of("emps")[0] == study_from_mapping(dataset_study("emps"))
+    study, folder = study_of(str(tmp_path / "run.csv.gz"))
+    assert study.record[0].files == ("run.csv.gz",) and study.record[0].side == "joint" and folder == tmp_path
+    with pytest.raises(InputError, match="expected a dataset"):
+        study_of("rx90")
 
 
 @pytest.mark.parametrize(
