@@ -30,7 +30,7 @@ from runtime.essential import essential
 from runtime.estimators import linear_system
 from runtime.estimators.linear import assemble
 from runtime.model import GeneratedModel, load_model
-from runtime.observation import Observation, Selection, decimated_torque, observation_from_states, observe, select_rows
+from runtime.observation import Observation, Selection, decimated_torque, observation_from_states, observe, select_rows, stack
 from runtime.processes import results
 from runtime.record import Record
 from runtime.rounding import rounded, stream
@@ -40,23 +40,28 @@ from runtime.study import CestacSettings, EstimateSettings, Study, to_mapping
 Array = np.ndarray
 Progress = Callable[[Run, int, int], None]
 
-TORQUE_STREAM = 1
-"""Third key of the random stream of the torques, so that positions draw the same numbers with and without them."""
-
 
 @dataclass(frozen=True, eq=False)
-class Task:
-    """What every run needs; travels once to each process.
+class Part:
+    """One record, with what does not change from run to run.
 
-    q, tau : ndarray, shape (N, n), as measured, joint side.   torque : ndarray, shape (n, K), Y before rows are left out.
-    model : the module, or the path of its file in another process.
+    q, tau : ndarray, shape (N, n), as measured, joint side.   selection : rows used, those of the measured record.
+    torque : ndarray, shape (n, K), Y before rows are left out.
     """
 
     q: Array
     tau: Array
     rate: float
+    files: Mapping[str, str]
     selection: Selection
     torque: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What every run needs; travels once to each process. `model` is the module, or the path of its file for another process."""
+
+    parts: tuple[Part, ...]
     model: GeneratedModel | str
     names: tuple[str, ...]
     estimate: EstimateSettings
@@ -68,7 +73,7 @@ class Task:
 
 def cestac(
     model: GeneratedModel,
-    record: Record,
+    records: Record | Sequence[Record],
     study: Study,
     *,
     columns: Sequence[str] | None = None,
@@ -79,11 +84,12 @@ def cestac(
     finished: Sequence[Run] = (),
     provenance: Mapping[str, Any] | None = None,
 ) -> Cestac:
-    """Resolution study of one record by the settings study.cestac.
+    """Resolution study by the settings study.cestac.
 
     Parameters
     ----------
-    columns : essential names where they are known; default: those of `study` on this record. Unused unless study.cestac.columns is "essential".
+    records : one record of the robot, or several that are stacked.
+    columns : essential names where they are known; default: those of `study` on these records. Unused unless study.cestac.columns is "essential".
     drives : motor side; default: DRIVES of the model.
     constants : values in place of the robot file's.
     workers : processes, 0 for this one (`runtime.processes`); the results do not depend on it. A script that asks for processes needs the usual
@@ -92,38 +98,38 @@ def cestac(
     finished : runs of an interrupted or shorter study with the same settings, not repeated.
     """
     settings = study.cestac
-    signals = replace(study.signals, median=settings.median)
-    states = filtered_states(record.q, record.rate, signals)
-    selection = select_rows(record, states.qd, signals, study.rows)
-    torque = decimated_torque(record.tau, selection)
-    names = _columns(model, record, study, columns, constants)
-    fit_settings = replace(study.estimate, columns="all")
-    seen = observation_from_states(_through(model, names), states, torque, selection, files=record.files, constants=constants)
-    seen = seen.columns(names)
-    system = linear_system(seen, fit_settings)
-    reference = assemble(system, system.solve(), model=model, provenance=provenance)
+    records = (records,) if isinstance(records, Record) else tuple(records)
     drives = Drives.from_mapping(model.DRIVES) if drives is None and model.DRIVES is not None else drives
     if settings.side == "motor" and drives is None:
         raise SettingsError(
             f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("cestac", "side")
         )
-    levels = levels_of(settings)
+    names = _columns(model, records, study, columns, constants)
     task = Task(
-        record.q, record.tau, record.rate, selection, torque, model, names, fit_settings, settings, levels, drives, dict(constants or {})
+        parts=tuple(_part(record, study) for record in records),
+        model=model,
+        names=names,
+        estimate=replace(study.estimate, columns="all"),
+        settings=settings,
+        levels=levels_of(settings),
+        drives=drives,
+        constants=dict(constants or {}),
     )
+    seen = _observed(task, model, Level(0.0), ())
+    system = linear_system(seen, task.estimate)
+    reference = assemble(system, system.solve(), model=model, provenance=provenance)
     runs = _all_runs(task, workers, progress, finished)
-    described = {
-        **seen.settings,
-        "estimate": to_mapping(study.estimate),
-        "cestac": to_mapping(settings),
-        "rate": record.rate,
-        "torque_side": "joint" if drives is None else "motor",
-    }
     return Cestac(
         names=names,
         reference=reference,
-        levels=tuple(level_result(level, runs[k], seen, reference) for k, level in enumerate(levels)),
-        settings=described,
+        levels=tuple(level_result(level, runs[k], seen, reference) for k, level in enumerate(task.levels)),
+        settings={
+            **seen.settings,
+            "estimate": to_mapping(study.estimate),
+            "cestac": to_mapping(settings),
+            "rate": [record.rate for record in records],
+            "torque_side": "joint" if drives is None else "motor",
+        },
         provenance={**reference.provenance, "seed": settings.seed},
     )
 
@@ -136,7 +142,7 @@ def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
 
 
 def perturbed_position(q: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]) -> Array:
-    """q_CESTAC of eqs. (15), (28), shape (N, n), from the measured q."""
+    """q_CESTAC of eqs. (15), (28), shape (N, n), from the measured q; `key` of its random stream."""
     if not level.delta:
         return q
     rng = stream(settings.seed, *key)
@@ -147,7 +153,7 @@ def perturbed_position(q: Array, level: Level, settings: CestacSettings, drives:
 
 def perturbed_torque(tau: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]) -> Array:
     """Joint torques, shape (N, n), with motor torques (N m) rounded in steps of Phi; joint torques where there are no drives."""
-    rng = stream(settings.seed, *key, TORQUE_STREAM)
+    rng = stream(settings.seed, *key)
     if drives is None:
         return rounded(tau, level.torque, settings.rounding, rng)
     motor = drives.motor_command(tau) * drives.torque_constant
@@ -157,19 +163,38 @@ def perturbed_torque(tau: Array, level: Level, settings: CestacSettings, drives:
 def one_run(task: Task, key: tuple[int, int]) -> Run:
     """One estimate from perturbed measurements; key = (level, run)."""
     number, run = key
-    level, settings = task.levels[number], task.settings
-    stream_key = (run,) if settings.common else (number, run)
     model = _loaded(task.model) if isinstance(task.model, str) else task.model
-    signals = task.selection.signals
-    states = filtered_states(perturbed_position(task.q, level, settings, task.drives, stream_key), task.rate, signals)
-    torque = task.torque
-    if level.torque:
-        torque = decimated_torque(perturbed_torque(task.tau, level, settings, task.drives, stream_key), task.selection)
-    seen = observation_from_states(_through(model, task.names), states, torque, task.selection, constants=task.constants)
-    system = linear_system(seen.columns(task.names), task.estimate)
+    seen = _observed(task, model, task.levels[number], (run,) if task.settings.common else (number, run))
+    system = linear_system(seen, task.estimate)
     fit = system.solve()
     norm = float(np.linalg.norm([joint.residual_norm(fit.X) for joint in system.raw.joints]))
     return Run(number, run, tuple(fit.X.tolist()), norm)
+
+
+def _observed(task: Task, model: GeneratedModel, level: Level, key: tuple[int, ...]) -> Observation:
+    """The system with perturbed measurements. Record k draws positions with (*key, 2 k) and torques with (*key, 2 k + 1), record 0 positions
+    with `key` itself: a draw is the same with and without torques, and whatever records follow.
+    """
+    narrow = _through(model, task.names)
+    observations = []
+    for k, part in enumerate(task.parts):
+        position_key = (*key, 2 * k) if k else key
+        q = perturbed_position(part.q, level, task.settings, task.drives, position_key)
+        torque = part.torque
+        if level.torque:
+            tau = perturbed_torque(part.tau, level, task.settings, task.drives, (*key, 2 * k + 1))
+            torque = decimated_torque(tau, part.selection)
+        states = filtered_states(q, part.rate, part.selection.signals)
+        seen = observation_from_states(narrow, states, torque, part.selection, files=part.files, constants=task.constants)
+        observations.append(seen.columns(task.names))
+    return observations[0] if len(observations) == 1 else stack(observations)
+
+
+def _part(record: Record, study: Study) -> Part:
+    """Rows and torques of the measured record, through the filters of the study."""
+    signals = replace(study.signals, median=study.cestac.median)
+    selection = select_rows(record, filtered_states(record.q, record.rate, signals).qd, signals, study.rows)
+    return Part(record.q, record.tau, record.rate, dict(record.files), selection, decimated_torque(record.tau, selection))
 
 
 def _all_runs(task: Task, workers: int, progress: Progress | None, finished: Sequence[Run]) -> tuple[tuple[Run, ...], ...]:
@@ -189,14 +214,14 @@ def _all_runs(task: Task, workers: int, progress: Progress | None, finished: Seq
 
 
 def _columns(
-    model: GeneratedModel, record: Record, study: Study, columns: Sequence[str] | None, constants: Mapping[str, float] | None
+    model: GeneratedModel, records: Sequence[Record], study: Study, columns: Sequence[str] | None, constants: Mapping[str, float] | None
 ) -> tuple[str, ...]:
     """Names of the columns: a list, all, or the essential ones of the identification that `study` describes."""
     wanted = study.cestac.columns
     if wanted == "essential":
         if columns is None:
-            observation: Observation = observe(model, record, study, constants=constants)
-            return essential(observation, study.essential, study.estimate).names
+            observations = [observe(model, record, study, constants=constants) for record in records]
+            return essential(stack(observations), study.essential, study.estimate).names
         wanted = tuple(columns)
     elif wanted == "all":
         wanted = tuple(model.BASE_PARAMETERS)

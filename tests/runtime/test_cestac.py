@@ -126,6 +126,17 @@ def test_other_columns_are_not_evaluated_into_the_fit():
     assert len(found.levels[0].mean) == 4
 
 
+def test_several_records_are_stacked():
+    other = record(N=4000, seed=5)
+    found = cestac(planar, [RECORD, other], study(delta=(1e-3,)))
+    assert found.reference.rows > cestac(planar, RECORD, study(delta=(1e-3,), runs=2)).reference.rows
+    assert found.settings["rate"] == [1000.0, 1000.0]
+    again = cestac(planar, [RECORD, other], study(delta=(1e-3,)))
+    assert again.to_json() == found.to_json()
+    alike = cestac(planar, [RECORD, RECORD], study(delta=(1e-3,)))  # the two draw different numbers: less scatter than one record
+    assert np.median(alike.levels[0].sigma) < np.median(cestac(planar, RECORD, study(delta=(1e-3,), runs=3)).levels[0].sigma)
+
+
 def test_torque_steps_alone_change_little_and_go_through_the_drives():
     found = cestac(planar, RECORD, study(delta=(1e-3,), torque=(1e-3, 0.01)))
     assert [result.level for result in found.levels] == [Level(1e-3), Level(0, 1e-3), Level(0, 0.01), Level(1e-3, 1e-3), Level(1e-3, 0.01)]
@@ -135,7 +146,7 @@ def test_torque_steps_alone_change_little_and_go_through_the_drives():
     assert alone.e_rho < 1
     assert found.settings["torque_side"] == "motor"
     drives = Drives.from_mapping(planar.DRIVES)
-    noise = perturbed_torque(RECORD.tau, Level(0, 0.01), study().cestac, drives, (1, 0)) - RECORD.tau
+    noise = perturbed_torque(RECORD.tau, Level(0, 0.01), study().cestac, drives, (1, 0, 1)) - RECORD.tau
     assert np.allclose(np.unique(np.round(noise @ np.linalg.inv(drives.ratio), 9)), [-0.01, 0.01])
 
 
@@ -201,7 +212,7 @@ def test_runs_needed():
 
 def test_text_and_json(small):
     data = json.loads(small.to_json(), parse_constant=lambda name: pytest.fail(name))
-    assert data["settings"]["rate"] == 1000.0 and data["settings"]["cestac"]["seed"] == 1
+    assert data["settings"]["rate"] == [1000.0] and data["settings"]["cestac"]["seed"] == 1
     assert data["settings"]["signals"]["lowpass"]["cutoff"] == 20 and data["settings"]["factor"] == 20
     assert data["provenance"]["seed"] == 1 and data["provenance"]["files"] == {"planar.csv": "cd" * 32}
     assert len(data["levels"]) == 2 and data["levels"][0]["level"] == {"delta": 0.001, "torque": 0.0}
