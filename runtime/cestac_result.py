@@ -59,7 +59,7 @@ class Level:
         parts = []
         if self.delta:
             counts = 2 * np.pi / self.delta
-            parts.append(f"2*pi/{counts:.0f}" if counts >= 2 and abs(counts - round(counts)) < 1e-6 * counts else f"{self.delta:.4g}")
+            parts.append(f"2*pi/{counts:.0f}" if counts >= 2 and abs(counts - round(counts)) < 1e-9 * counts else f"{self.delta:.4g}")
         if self.torque:
             parts.append(f"Phi {self.torque:.4g}")
         return " + ".join(parts) or "none"

@@ -220,6 +220,7 @@ def test_text_and_json(small):
     assert "%e(rho), printed" in text and "verdict" in text
     assert len(small.errors_table().splitlines()) == 11
     assert Level(2 * np.pi / 5000).label == "2*pi/5000" and Level(0.0).label == "none"
+    assert Level(1e-6).label == "1e-06"  # a linear encoder, m: no counts per turn
 
 
 def test_reference_is_the_estimate_of_the_measured_record(small):

@@ -212,6 +212,18 @@ def test_few_rows_are_a_status():
     assert found.message
 
 
+@pytest.mark.parametrize("settings", EVERY[:3], ids=KINDS[:3])
+def test_a_joint_without_rows_is_left_out(settings):
+    """All rows of joint 1 dropped (low speed): friction of joint 1 has no effect, the rest is estimated from joint 2."""
+    seen = observation(noise=(0.1, 0.1)).where(np.repeat([False, True], 300))
+    found = estimate(seen, settings)
+    assert [fit.rows for fit in found.per_joint] == [0, 300]
+    assert found.status == "rank-deficient"
+    assert {("FV1",), ("FS1",), ("ZZ1R",)} <= set(found.groups)
+    assert abs(found["FV2"] - TRUE[8]) < 5 * found.sigma[8]
+    assert "null" in found.to_json() and "-" in str(found)
+
+
 def test_columns_restrict_the_estimate():
     seen = observation(noise=(0.1, 0.1))
     kept = ("ZZ1R", "FV1", "FS1", "MX1R", "ZZ2", "MX2", "FV2", "FS2")
