@@ -23,8 +23,9 @@ from runtime.columns import decimated_columns
 from runtime.errors import InputError
 from runtime.model import GeneratedModel, check_states
 from runtime.record import Record
-from runtime.signals import States, decimated, decimation_factor, filtered_states, kept_samples, median_filtered
-from runtime.study import Rows, Signals, Study, to_mapping
+from runtime.rows import Selection, select_rows
+from runtime.signals import States, decimated, filtered_states, median_filtered
+from runtime.study import Study, to_mapping
 
 Array = np.ndarray
 
@@ -99,24 +100,6 @@ class Observation:
         return self.where(inside)
 
 
-@dataclass(frozen=True, eq=False)
-class Selection:
-    """Which samples are evaluated and which decimated rows are kept; shared by every run of a study.
-
-    samples : the window, in raw samples.   kept : shape (K,), kept instants, from the start of the window.   mask : bool (n, K), rows used.
-    """
-
-    samples: slice
-    kept: Array
-    mask: Array
-    factor: int
-    t: Array
-    rate: float
-    signals: Signals
-    rows: Rows
-    dropped: Mapping[str, tuple[int, ...]]
-
-
 def observe(
     model: GeneratedModel,
     record: Record,
@@ -136,32 +119,6 @@ def observe(
     selection = select_rows(record, states.qd, study.signals, study.rows, keep=keep)
     torque = decimated_torque(record.tau, selection)
     return observation_from_states(model, states, torque, selection, files=record.files, columns=columns, constants=constants)
-
-
-def select_rows(record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None) -> Selection:
-    """Window, decimated instants, and the rows left out by trim, low speed and `keep`; qd, shape (N, n), are the filtered velocities."""
-    samples = _window(record, rows)
-    factor = decimation_factor(signals, record.rate)
-    N = samples.stop - samples.start
-    kept = kept_samples(N, factor, signals.decimate.phase if signals.decimate else "first")
-    instants = kept + samples.start
-    if len(kept) <= 2 * rows.trim:
-        raise InputError(
-            f"{len(kept)} rows per joint after decimation by {factor}, of which rows.trim leaves out {2 * rows.trim}", file=record.name
-        )
-    mask = np.ones((record.n, len(kept)), dtype=bool)
-    dropped = {}
-    for reason, usable in (
-        ("trim", _untrimmed(len(kept), rows.trim)),
-        ("low_speed", np.abs(qd[instants].T) >= _per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None]),
-        ("mask", True if keep is None else _keep(keep, record)[instants].T),
-    ):
-        before = mask.sum(axis=1)
-        mask &= usable
-        dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
-    if not mask.any():
-        raise InputError(f"no row is left: {dropped} rows per joint were left out of {len(kept)}", file=record.name)
-    return Selection(samples, kept, mask, factor, record.t[instants], record.rate / factor, signals, rows, dropped)
 
 
 def decimated_torque(tau: Array, selection: Selection) -> Array:
@@ -234,8 +191,17 @@ def stack(observations: Sequence[Observation]) -> Observation:
         settings=first.settings
         if all(o.settings == first.settings for o in observations)
         else {"records": [o.settings for o in observations]},
-        files={name: value for o in observations for name, value in o.files.items()},
+        files=_all_files(observations),
     )
+
+
+def _all_files(observations: Sequence[Observation]) -> dict[str, str]:
+    """Hashes by file name; a name that stands for another file in a later record gets the number of that record."""
+    files: dict[str, str] = {}
+    for k, o in enumerate(observations, start=1):
+        for name, digest in o.files.items():
+            files[name if files.get(name, digest) == digest else f"{name} ({k})"] = digest
+    return files
 
 
 def _numbers(names: Sequence[str], among: Sequence[str]) -> list[int]:
@@ -243,37 +209,6 @@ def _numbers(names: Sequence[str], among: Sequence[str]) -> list[int]:
     if unknown:
         raise InputError(f"no column {', '.join(unknown)}; there are {', '.join(among)}")
     return [list(among).index(name) for name in names]
-
-
-def _window(record: Record, rows: Rows) -> slice:
-    """Raw samples with t0 <= t <= t1."""
-    t0, t1 = rows.window
-    start = 0 if t0 is None else int(np.searchsorted(record.t, t0, side="left"))
-    stop = len(record) if t1 is None else int(np.searchsorted(record.t, t1, side="right"))
-    if stop <= start:
-        raise InputError(
-            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{record.t[0]:g}, {record.t[-1]:g}] s", file=record.name
-        )
-    return slice(start, stop)
-
-
-def _untrimmed(K: int, trim: int) -> Array:
-    inside = np.arange(K)
-    return (inside >= trim) & (inside < K - trim)
-
-
-def _keep(keep: Array, record: Record) -> Array:
-    keep = keep[:, None] if keep.ndim == 1 else keep
-    if keep.dtype != np.bool_ or keep.shape not in {(len(record), 1), (len(record), record.n)}:
-        raise InputError(f"keep {keep.dtype} {keep.shape}; expected bool {(len(record),)} or {(len(record), record.n)}", file=record.name)
-    return keep
-
-
-def _per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
-    values = np.atleast_1d(np.asarray(value, dtype=float))
-    if values.shape not in {(1,), (n,)}:
-        raise InputError(f"{name} has {len(values)} values; expected one or {n}, one per joint")
-    return np.broadcast_to(values, (n,))
 
 
 __all__ = [

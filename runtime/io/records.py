@@ -57,7 +57,8 @@ def read_record(settings: RecordSettings, drives: Drives | None = None, *, folde
     t, rate = _time(settings, first, names.t, len(q))
     q = q * _scale(settings.scale.q, first, n, "scale.q") * _position_units(settings, n)
     tau = tau * _scale(settings.scale.tau, last, n, "scale.tau")
-    files = {path.name: digest for path, (_, digest) in zip(paths, tables, strict=True)}
+    distinct = len({Path(file).name for file in settings.files}) == len(settings.files)
+    files = {Path(file).name if distinct else file: digest for file, (_, digest) in zip(settings.files, tables, strict=True)}
     name = settings.name or settings.dataset or paths[0].name.split(".")[0]
     constant = _torque_constant(settings, drives, n)
     if settings.side == "joint":

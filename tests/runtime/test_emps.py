@@ -1,19 +1,30 @@
 """EMPS, every published digit: A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, 2019, EMPS_Description.pdf section 3.4."""
 
+from pathlib import Path
+
 import emps_asymmetric_model
 import emps_model
 import numpy as np
 import pytest
 
-from runtime import observe, read_records, study_from_mapping
+from runtime import load_model, observe, read_records, study_from_mapping
 from runtime.io.datasets import dataset_study
 
+EMITTED = Path(__file__).parents[2] / "generated"
 PUBLISHED = [95.1089, 203.5034, 20.3935, -3.1648]  # M kg, Fv N s/m, Fc N, offset N
 
 
 @pytest.fixture(scope="module")
 def study():
     return study_from_mapping(dataset_study("emps"))
+
+
+@pytest.fixture(scope="module", params=["by hand", "emitted"])
+def axis(request):
+    """The two models, written by hand (no generator) and emitted."""
+    if request.param == "by hand":
+        return emps_model, emps_asymmetric_model
+    return load_model(EMITTED / "emps.py"), load_model(EMITTED / "emps_asymmetric.py")
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +38,8 @@ def solve(observation):
     return X, Y - W @ X, np.linalg.inv(W.T @ W)
 
 
-def test_estimation_record(records, study):
-    o = observe(emps_model, records[0], study)
+def test_estimation_record(axis, records, study):
+    o = observe(axis[0], records[0], study)
     X, rho, C = solve(o)
     assert o.W.shape == (2480, 4)
     assert X.round(4).tolist() == PUBLISHED
@@ -58,8 +69,8 @@ def test_validation_record_with_the_estimate(records, study):
     assert round(100 * np.linalg.norm(rho) / np.linalg.norm(o.Y), 4) == 5.9824
 
 
-def test_asymmetric_friction(records, study):
-    o = observe(emps_asymmetric_model, records[0], study)
+def test_asymmetric_friction(axis, records, study):
+    o = observe(axis[1], records[0], study)
     X, rho, _ = solve(o)
     assert X.round(4).tolist() == [95.1540, 166.7061, 20.1440, 240.4236, 20.6277]
     assert round(np.linalg.cond(o.W), 4) == 26.0197

@@ -1,5 +1,6 @@
 """The observed system: equal to the plain recipe, row bookkeeping, the steps that a resolution study repeats, several records as one."""
 
+import dataclasses
 import types
 
 import emps_model
@@ -208,6 +209,13 @@ def test_stack_is_joint_major(record):
     assert stack([a]).W.shape == a.W.shape and "records" not in stack([b, b]).settings
     nested = stack([stack([a, b]), b])
     np.testing.assert_array_equal(nested.record[nested.joint(0)], o.record[o.joint(0)])
+
+
+def test_stack_keeps_every_hash(record):
+    a = observe(planar, record, study())
+    b = dataclasses.replace(a, files={"arm.csv": "cd" * 32})
+    assert stack([a, a]).files == a.files
+    assert stack([a, b]).files == {"arm.csv": "ab" * 32, "arm.csv (2)": "cd" * 32}
 
 
 def test_stack_refuses(record):

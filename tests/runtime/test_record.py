@@ -91,6 +91,13 @@ def test_hash_is_that_of_the_uncompressed_bytes(tmp_path):
     assert read_record(settings(files=str(packed))).files == {"b.csv.gz": digest}
 
 
+def test_two_files_of_one_name_keep_both_hashes(tmp_path):
+    for folder, header, x in (("a", "q1,q2", Q), ("b", "tau1,tau2", TAU)):
+        (tmp_path / folder).mkdir()
+        write_csv(tmp_path / folder / "x.csv", header=header, rows=x)
+    assert set(read_record(settings(files=["a/x.csv", "b/x.csv"], rate=RATE), folder=tmp_path).files) == {"a/x.csv", "b/x.csv"}
+
+
 def test_file_without_header_counts_its_columns(tmp_path):
     write_csv(tmp_path / "a.csv", header="")
     record = read_record(settings(files="a.csv", columns={"t": 1, "q": [2, 3], "tau": [4, 5]}), folder=tmp_path)

@@ -23,6 +23,7 @@ def record(tx40_data, study):
 
 def test_starts_and_ends_at_the_zero_pose(record):
     assert record.q.shape == (45000, 6) and record.rate == 5000
+    assert set(record.files) == {"pos_read_data.csv", "curr_data.csv"}  # compressed or not
     np.testing.assert_allclose(record.q[[0, -1]], 0, atol=2e-5)
 
 
