@@ -18,8 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -175,7 +174,6 @@ def _observed(task: Task, model: GeneratedModel, level: Level, key: tuple[int, .
     """The system with perturbed measurements. Record k draws positions with (*key, 2 k) and torques with (*key, 2 k + 1), record 0 positions
     with `key` itself: a draw is the same with and without torques, and whatever records follow.
     """
-    narrow = _through(model, task.names)
     observations = []
     for k, part in enumerate(task.parts):
         position_key = (*key, 2 * k) if k else key
@@ -185,8 +183,10 @@ def _observed(task: Task, model: GeneratedModel, level: Level, key: tuple[int, .
             tau = perturbed_torque(part.tau, level, task.settings, task.drives, (*key, 2 * k + 1))
             torque = decimated_torque(tau, part.selection)
         states = filtered_states(q, part.rate, part.selection.signals)
-        seen = observation_from_states(narrow, states, torque, part.selection, files=part.files, constants=task.constants)
-        observations.append(seen.columns(task.names))
+        seen = observation_from_states(
+            model, states, torque, part.selection, files=part.files, columns=task.names, constants=task.constants
+        )
+        observations.append(seen)
     return observations[0] if len(observations) == 1 else stack(observations)
 
 
@@ -230,22 +230,6 @@ def _columns(
         message = f"no parameter {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}"
         raise SettingsError(message, path=("cestac", "columns"))
     return wanted
-
-
-def _through(model: GeneratedModel, names: Sequence[str]) -> GeneratedModel:
-    """The model with the other columns declared zero: they are neither decimated nor stored."""
-    kept = np.isin(model.BASE_PARAMETERS, names)
-    return cast(
-        GeneratedModel,
-        SimpleNamespace(
-            NAME=model.NAME,
-            JOINTS=model.JOINTS,
-            BASE_PARAMETERS=model.BASE_PARAMETERS,
-            STRUCTURE=np.asarray(model.STRUCTURE) & kept[:, None],
-            store=model.store,
-            regressor=model.regressor,
-        ),
-    )
 
 
 @lru_cache(maxsize=1)
