@@ -105,7 +105,8 @@ class Text:
         fixed = [n for n in self.nodes if n.index in self.named and n.fixed]
         if fixed:
             sections.append(Section("Constants", tuple(self._line(n) for n in fixed)))
-        angles = [n for n in self.nodes if n.index in self.named and not n.fixed and self._is_angle(n)]
+        trigonometry = {n.index for n in reachable([Scalar(None, n, 1) for n in self.nodes if n.op in (COS, SIN)])}  # type: ignore[arg-type]
+        angles = [n for n in self.nodes if n.index in self.named and not n.fixed and n.index in trigonometry]
         if angles:
             sections.append(Section("Trigonometry", tuple(self._line(n) for n in angles)))
         done = {n.index for n in fixed + angles}
@@ -120,9 +121,6 @@ class Text:
             else:
                 sections.append(Section(marks[k][1], tuple(lines)))
         return tuple(sections)
-
-    def _is_angle(self, node: Node) -> bool:
-        return node.op in (COS, SIN) or (node.name is not None and node.name.startswith("th"))
 
     def _line(self, node: Node) -> str:
         return f"{self.called[node.index]} = {self._body(Scalar(None, node, self._name_sign(node)))}"  # type: ignore[arg-type]

@@ -72,6 +72,9 @@ class Program:
         return {COS: graph.cos, SIN: graph.sin, SIGN: graph.sign, POS: graph.positive_part, SQRT: graph.sqrt, INV: graph.inverse}[node.op](y)
 
     def _numbered(self, image: Scalar, value: Array) -> Scalar | int:
+        """`image`, or the equal node that was there before; `value` is that of the node, without the sign of the edge."""
+        if image.sign < 0:
+            return -self._numbered(-image, value)
         value = np.broadcast_to(value, (SAMPLES,)) % self.p
         for number in (0, 1, self.p - 1):
             if (value == number).all() and image.node.op != CONST:

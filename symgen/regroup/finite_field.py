@@ -11,7 +11,7 @@ linear in b, so a generic b proves what bits would.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from functools import lru_cache
 from math import gcd, lcm
@@ -70,21 +70,33 @@ def power(x: Array, n: int, p: int) -> Array:
     return result
 
 
+def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
+    """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and the leading sign positive."""
+    found: dict[Expression, None] = {}
+    for e in _angles(robot):
+        rest = quarter_turns(e)[1]
+        if rest and -rest not in found:
+            found[rest] = None
+    return tuple(found)
+
+
 def angle_denominators(robot: Robot) -> dict[Monomial, int]:
     """{monomial: D}: every fixed angle is a sum of whole multiples of monomial/D."""
     D: dict[Monomial, int] = {PI: 2}
-    for e in _fixed_angles(robot):
+    for e in fixed_angles(robot):
         for m, c in e.terms.items():
             D[m] = lcm(D.get(m, 1), c.denominator)
     return D
 
 
-def _fixed_angles(robot: Robot) -> Iterator[Expression]:
+def _angles(robot: Robot) -> Iterator[Expression]:
     for f in robot.frames:
         yield from (f.gamma, f.alpha, f.theta0)
-    yield from robot.constraints.values()
+    joints = {f"q{i}": Expression() for i in robot.moving}
+    for e in robot.constraints.values():
+        yield e.substitute(joints)
     lengths = [e for f in robot.frames for e in (f.b, f.d, f.r0)]
-    rows = [c for e in robot.elements for table in (e.along, e.form) for row in table.values() for c in row.values()]  # type: ignore[attr-defined]
+    rows = [c for e in robot.elements for table in (e.along, e.form) for row in table.values() for c in row.values()]
     for e in (*robot.gravity, *lengths, *rows):
         yield from (a.argument for a in e.atoms if isinstance(a, Call) and a.function in ("cos", "sin"))
 
@@ -128,20 +140,24 @@ Point = tuple[Array, Array]  # (cos, sin) over F_p
 class Draw:
     """One random robot and `samples` random states over F_p: an Algebra of the derivation.
 
-    `constants` fixes chosen constants (residues); the others are random. Redraws until every square root exists.
+    `geometry` gives residues, shape (count, 1), for constants by name and for half-angle tangents of fixed angles by their unit: `count`
+    robots in the same states. Without it everything is random and redrawn until every square root exists.
     """
 
-    def __init__(self, robot: Robot, seed: int, samples: int, *, p: int | None = None, constants: dict[str, int] | None = None) -> None:
+    def __init__(
+        self, robot: Robot, seed: int, samples: int, *, p: int | None = None, geometry: Mapping[str | Monomial, Array] | None = None, count: int = 0
+    ) -> None:
         self.robot, self.samples = robot, samples
+        self.shape = (count, samples) if geometry is not None else (samples,)
+        self._geometry = geometry or {}
         self.denominators = angle_denominators(robot)
         self.p = p if p is not None else primes_for(self.denominators[PI], 1)[0]
         self.rng = np.random.default_rng(seed)
         for _ in range(200):
-            self._constants = {name: self._random(1) for name in robot.constants}
-            self._constants |= {name: np.array([c % self.p]) for name, c in (constants or {}).items()}
+            self._constants = {name: self._geometry[name] if name in self._geometry else self._random(1) for name in robot.constants}
+            self._angles: dict[Monomial, Point] = {}
             if self._roots_exist():
                 break
-        self._angles: dict[Monomial, Point] = {}
         self._directions: dict[tuple[tuple[int, Expression], ...], Array] = {}
         self._q = {j: self._random(samples) for j in robot.joints}
         self._qd = {j: self._random(samples) for j in robot.joints}
@@ -155,7 +171,9 @@ class Draw:
         return Fp(x, self.p)
 
     def _circle(self, size: int) -> Point:
-        t = self._random(size)
+        return self._point_at(self._random(size))
+
+    def _point_at(self, t: Array) -> Point:
         inverse = power((1 + t * t) % self.p, self.p - 2, self.p)
         return (1 - t * t) % self.p * inverse % self.p, 2 * t % self.p * inverse % self.p
 
@@ -178,13 +196,18 @@ class Draw:
     def _unit(self, m: Monomial) -> Point:
         """The point of the angle monomial/D; for pi a root of unity of order 2D."""
         if m not in self._angles:
-            self._angles[m] = self._root_of_unity(2 * self.denominators[m]) if m == PI else self._circle(1)
+            if m in self._geometry:
+                self._angles[m] = self._point_at(self._geometry[m])
+            else:
+                self._angles[m] = self._root_of_unity(2 * self.denominators[m]) if m == PI else self._circle(1)
         return self._angles[m]
 
     def _root_of_unity(self, order: int) -> Point:
+        """A point of that order, a multiple of 4, a quarter of which is (0, 1)."""
         while True:
             root = self._multiple(self._circle(1), (self.p + 1) // order)
-            if all(self._multiple(root, order // k)[0][0] != 1 for k in range(2, order + 1) if order % k == 0):
+            primitive = all(self._multiple(root, order // k)[0][0] != 1 for k in range(2, order + 1) if order % k == 0)
+            if primitive and self._multiple(root, order // 4)[1][0] == 1:
                 return root
 
     def _angle(self, e: Expression) -> Point:
@@ -197,7 +220,6 @@ class Draw:
         return point
 
     def _roots_exist(self) -> bool:
-        self._angles: dict[Monomial, Point] = {}
         try:
             for f in self.robot.frames:
                 for e in (f.b, f.d, f.r0):

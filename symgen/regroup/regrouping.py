@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from symgen.derive.columns import element_names, inertial_names
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.robot import PRISMATIC, Robot
-from symgen.regroup.finite_field import Draw, rref, small_rational
+from symgen.regroup.finite_field import Draw, rref
 from symgen.regroup.rules import Combination, Step, Transfer
-from symgen.regroup.solve import Relation, sample, states_for
+from symgen.regroup.solve import coefficients, sample, states_for
 
 FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
 LAST_CHOICE = ("MZ", "M", "YY")
@@ -66,8 +66,7 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     steps = list(transfer.steps)
     for c in sorted(set(range(len(names))) - set(pivots)):
         support = tuple(base[k] for k in range(len(base)) if R[k, c])
-        residues = [int(x) for x in R[:, c] if x]
-        for target, beta in zip(support, _coefficients(robot, names[c], support, residues, draw.p, seed), strict=True):
+        for target, beta in zip(support, coefficients(robot, names[c], support) if support else (), strict=True):
             steps.append((names[c], target, beta))
             into = combination[target]
             for name, value in transfer.combination[names[c]].items():
@@ -93,17 +92,6 @@ def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
         return (4, j, LAST_CHOICE.index(family))
 
     return tuple(sorted(names, key=rank))
-
-
-def _coefficients(robot: Robot, dependent: str, support: tuple[str, ...], residues: list[int], p: int, seed: int) -> list[Expression]:
-    if not support:
-        return []
-    relation = Relation(robot, dependent, support)
-    fresh = relation.residues(Draw(robot, seed + 1, states_for(robot, len(support) + 1)))
-    constants = [small_rational(x, p) if x == y else None for x, y in zip(residues, fresh, strict=True)]
-    if all(c is not None for c in constants):
-        return [Expression.number(c) for c in constants if c is not None]
-    return relation.monomials() or relation.exact()
 
 
 def _assemble(robot: Robot, combination: dict[str, Combination], steps: list[Step]) -> Regrouping:

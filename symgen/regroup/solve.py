@@ -1,42 +1,46 @@
 """Coefficients of the particular relations in Q(geometry): D_dependent = sum_k beta_k D_base,k.
 
-Over F_p each beta is a residue. It becomes an exact expression by the first of these that holds:
- (a) the same small rational in two draws of the geometry: a number;
- (b) c prod L_i**n_i: doubling one length multiplies beta by 2**n_i, and what is left is a small rational;
- (c) otherwise the (support + 1)-column system is solved over the fraction field of the lengths and half-angle tangents, from
-     regressor rows at small rational states (sympy DomainMatrix).
+Over F_p each beta is a residue, and a function of the geometry: lengths, gravity, (cos, sin) of fixed angles. Changing one of them at a
+time shows which ones matter. The rest is linear algebra: beta = P/Q with P, Q polynomials of rising degree in what matters,
+
+    sum_m P_m m(g) - beta(g) sum_m Q_m m(g) = 0     at more random geometries g than there are unknowns,
+
+a nullspace over F_p whose entries are then read as small rationals. Nothing is assumed of the result: the certificate checks it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
-from itertools import count
-from typing import Any
+from itertools import combinations, combinations_with_replacement, product
 
 import numpy as np
 
 from symgen.derive.columns import columns
 from symgen.derive.geometry import Geometry
 from symgen.derive.newton_euler import Motion
-from symgen.derive.scalar import Scalar, Turn
-from symgen.description.expression import Expression, call, quarter_turns
+from symgen.description.expression import ONE, Expression, Monomial, call
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
-from symgen.regroup.finite_field import Array, Draw, Fp, angle_denominators, rref, small_rational
+from symgen.regroup.finite_field import PI, Array, Draw, Fp, angle_denominators, fixed_angles, rref, small_rational
 
-MAX_POWER = 8
+MAX_UNKNOWNS = 900
+DEGREES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (3, 0), (3, 2), (3, 3), (4, 0), (4, 4), (6, 0), (6, 6))
+
+Variable = str | Monomial  # a constant's name, or the unit of a fixed angle
 
 
 def sample(draw: Draw, names: tuple[str, ...]) -> Array:
-    """The regressor columns `names` at the draw's states, shape (n_active * samples, len(names)), int64 residues."""
+    """The regressor columns `names` at the draw's states, shape (..., n_active * samples, len(names)), int64 residues."""
     robot = draw.robot
     D = columns(Motion(Geometry(robot, draw)), names)
-    W = np.zeros((len(names), len(robot.joints), draw.samples), dtype=np.int64)
+    W = np.zeros((len(names), len(robot.joints), *draw.shape), dtype=np.int64)
     for k, name in enumerate(names):
         for row, j in enumerate(robot.joints):
             value = D[name].get(j, 0)
             W[k, row] = value.x if isinstance(value, Fp) else value % draw.p
-    return W.reshape(len(names), -1).T
+    W = np.moveaxis(W, -1, 2)  # names, joints, samples, geometries
+    return np.moveaxis(W.reshape(len(names), -1, *draw.shape[:-1]), (0, 1), (-1, -2))
 
 
 def states_for(robot: Robot, n_columns: int) -> int:
@@ -44,193 +48,112 @@ def states_for(robot: Robot, n_columns: int) -> int:
     return -(-(n_columns + 10) // len(robot.joints)) + 4
 
 
-class Relation:
-    """One dependent column and the base columns it is a combination of."""
-
-    def __init__(self, robot: Robot, dependent: str, support: tuple[str, ...]) -> None:
-        self.robot, self.dependent, self.support = robot, dependent, support
-
-    def residues(self, draw: Draw) -> list[int]:
-        names = (*self.support, self.dependent)
-        pivots, R = rref(sample(draw, names), draw.p)
-        if pivots != list(range(len(self.support))):
-            raise SymgenError(f"the relation of {self.dependent} to {', '.join(self.support)} changes with the draw; this geometry is degenerate")
-        return [int(x) for x in R[:, -1]]
-
-    def monomials(self) -> list[Expression] | None:
-        """Case (b); None where a coefficient is not a monomial in the constants."""
-        robot, samples = self.robot, states_for(self.robot, len(self.support) + 1)
-        names = sorted(robot.constants)
-        rng = np.random.default_rng(len(names))
-        lengths = {name: int(rng.integers(2, 2**30)) for name in names}
-        draw = Draw(robot, 11, samples, constants=lengths)
-        p = draw.p
-        beta = self.residues(draw)
-        powers: list[dict[str, int]] = [{} for _ in beta]
-        for name in names:
-            doubled = self.residues(Draw(robot, 11, samples, constants=lengths | {name: 2 * lengths[name]}))
-            for k, (x, y) in enumerate(zip(beta, doubled, strict=True)):
-                n = next((n for n in range(-MAX_POWER, MAX_POWER + 1) if x * pow(2, n, p) % p == y), None)
-                if n is None:
-                    return None
-                powers[k][name] = n
-        result = []
-        for x, exponents in zip(beta, powers, strict=True):
-            e = Expression.number(1)
-            for name, n in exponents.items():
-                x = x * pow(pow(lengths[name], n, p), -1, p) % p
-                e = e * Expression.symbol(name) ** n
-            c = small_rational(x, p)
-            if c is None:
-                return None
-            result.append(e * c)
-        return result
-
-    def exact(self) -> list[Expression]:
-        """Case (c)."""
-        field = FractionField(self.robot)
-        names = (*self.support, self.dependent)
-        rows: list[list[Any]] = []
-        wanted = len(self.support)
-        for seed in count():
-            field.new_state(seed)
-            D = columns(Motion(Geometry(self.robot, field)), names)
-            for j in self.robot.joints:
-                row = [field.lift(D[name].get(j, 0)) for name in names]
-                if any(row):
-                    rows.append(row)
-            if len(rows) >= wanted + 2:
-                break
-            if seed > 4 * wanted + 8:
-                raise SymgenError(f"no rows for the relation of {self.dependent}")
-        return field.solve(rows, wanted, self.dependent)
+def coefficients(robot: Robot, dependent: str, support: tuple[str, ...]) -> list[Expression]:
+    """beta of D_dependent = sum_k beta_k D_support,k, exact. Raises SymgenError if no P/Q of moderate degree fits."""
+    for free_pi in (True, False):  # fractions of pi as any angle, if the relation holds for any; else at their exact values
+        try:
+            return _Relation(robot, dependent, support, free_pi).coefficients()
+        except _NotRecognised as error:
+            reason = error
+    raise SymgenError(f"{dependent} depends on {', '.join(support)}, but its coefficients were not recognised: {reason}")
 
 
-class FractionField:
-    """Exact rational states over Q(lengths, half-angle tangents): an Algebra of the derivation."""
+class _NotRecognised(Exception):
+    pass
 
-    def __init__(self, robot: Robot) -> None:
-        from sympy import QQ, symbols
 
-        self.robot = robot
+class _Relation:
+    def __init__(self, robot: Robot, dependent: str, support: tuple[str, ...], free_pi: bool) -> None:
+        self.robot, self.names = robot, (*support, dependent)
+        self.free_pi = free_pi
+        self.samples = -(-(len(support) + 7) // len(robot.joints)) + 2
         self.denominators = angle_denominators(robot)
-        atoms: list[str] = list(robot.constants)
-        self.angles = {m: f"t_{k}" for k, m in enumerate(m for m in self.denominators)}
-        generators = symbols([*atoms, *self.angles.values()])
-        self.K = QQ.frac_field(*generators)
-        self.generator = dict(zip([*atoms, *self.angles.values()], self.K.gens, strict=True))
-        self.special: dict[Expression, Any] = {}
+        units = [m for m in self.denominators if m != PI or (free_pi and self.denominators[PI] > 2)]
+        self.variables: tuple[Variable, ...] = (*robot.constants, *units)
+        self.p = Draw(robot, 0, 1).p
+        self.rng = np.random.default_rng(len(support))
 
-    def new_state(self, seed: int) -> None:
-        self.rng = np.random.default_rng(1000 + seed)
-        self.values: dict[tuple[str, int], Any] = {}
-
-    def _value(self, kind: str, j: int) -> Any:
-        if (kind, j) not in self.values:
-            self.values[kind, j] = self.K.convert(int(self.rng.integers(1, 10)))
-        return self.values[kind, j]
-
-    def _point(self, t: Any) -> tuple[Any, Any]:
-        return (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
-
-    def _multiple(self, a: tuple[Any, Any], n: int) -> tuple[Any, Any]:
-        if n < 0:
-            a, n = (a[0], -a[1]), -n
-        result = (self.K.one, self.K.zero)
-        for _ in range(n):
-            result = self._turned(result, a)
+    def coefficients(self) -> list[Expression]:
+        reference = {v: self.rng.integers(2, self.p, (1, 1)) for v in self.variables}
+        changed = {v: self.rng.integers(2, self.p, (1, 1)) for v in self.variables}
+        cases = [reference] + [reference | {v: changed[v]} for v in self.variables]
+        beta = self.residues({v: np.concatenate([case[v] for case in cases]) for v in self.variables}, len(cases))
+        result = []
+        for k in range(beta.shape[1]):
+            matters = [v for i, v in enumerate(self.variables, start=1) if beta[i, k] != beta[0, k]]
+            result.append(self._recognise(k, matters, reference))
         return result
 
-    def _turned(self, a: tuple[Any, Any], b: tuple[Any, Any]) -> tuple[Any, Any]:
-        return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
+    def residues(self, geometry: dict[Variable, Array], count: int) -> Array:
+        """beta at `count` geometries, shape (count, support)."""
+        draw = Draw(self.robot, 11, self.samples, geometry=geometry, count=count)
+        W = np.broadcast_to(sample(draw, self.names), (count, len(self.robot.joints) * self.samples, len(self.names)))
+        beta = np.zeros((count, len(self.names) - 1), dtype=np.int64)
+        for i in range(count):
+            pivots, R = rref(W[i], self.p)
+            if pivots != list(range(len(self.names) - 1)):
+                raise _NotRecognised("the relation does not hold for every geometry")
+            beta[i] = R[:, -1]
+        return beta
 
-    def _angle(self, e: Expression) -> tuple[Any, Any]:
-        turns, rest = quarter_turns(e)
-        quarter = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns % 4]
-        point = (self.K.convert(quarter[0]), self.K.convert(quarter[1]))
-        for m, c in rest.terms.items():
-            unit = self._point(self.generator[self.angles[m]])
-            point = self._turned(point, self._multiple(unit, int(c * self.denominators[m])))
-        return point
+    def _recognise(self, k: int, matters: Sequence[Variable], reference: dict[Variable, Array]) -> Expression:
+        for (numerator, denominator), angles in product(DEGREES, self._choices(matters)):
+            P, Q = self._monomials(matters, angles, numerator), self._monomials(matters, angles, denominator)
+            count = len(P) + len(Q) + 4
+            if count > MAX_UNKNOWNS or (numerator and not angles and not any(isinstance(v, str) for v in matters)):
+                continue
+            geometry = {v: self.rng.integers(2, self.p, (count, 1)) if v in matters else np.repeat(reference[v], count, 0) for v in self.variables}
+            beta = self.residues(geometry, count)[:, k]
+            values = Draw(self.robot, 11, 1, geometry=geometry, count=count)
+            p_columns = [self._value(values, m, count) for m in P]
+            q_columns = [-beta * self._value(values, m, count) % self.p for m in Q]
+            found = self._fraction(np.stack([*q_columns, *p_columns], axis=1), Q, P)
+            if found is not None:
+                return found
+        raise _NotRecognised(f"no fraction of degree up to {DEGREES[-1]} in {', '.join(map(str, matters))}")
 
-    def lift(self, value: Scalar) -> Any:
-        return self.K.convert(value) if type(value) is int else value
+    def _choices(self, matters: Sequence[Variable]) -> list[tuple[Expression, ...]]:
+        """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all."""
+        units = {v for v in matters if not isinstance(v, str)}
+        angles = [e for e in fixed_angles(self.robot) if units & set(e.terms)]
+        choices = [tuple(c) for n in (1, 2) for c in combinations(angles, n)]
+        return [*choices, *([tuple(angles)] if len(angles) > 2 else [])] if angles else [()]
 
-    def constant(self, e: Expression) -> Scalar:
-        c = e.constant
-        if c is not None and c in (0, 1, -1):
-            return int(c)
-        return e.evaluate(self.generator.__getitem__, self._call, self._number)
+    def _monomials(self, matters: Sequence[Variable], angles: Sequence[Expression], degree: int) -> list[tuple[Expression, ...]]:
+        """Products of at most `degree` constants, cosines and sines; sin to the first power only, as sin**2 = 1 - cos**2."""
+        sines = [call("sin", e) for e in angles]
+        atoms = [Expression.symbol(v) for v in matters if isinstance(v, str)] + [call("cos", e) for e in angles] + sines
+        products: list[tuple[Expression, ...]] = []
+        for d in range(degree + 1):
+            products += [m for m in combinations_with_replacement(atoms, d) if all(m.count(s) < 2 for s in sines)]
+        return products
 
-    def _number(self, c: Fraction) -> Any:
-        from sympy import QQ
+    def _value(self, draw: Draw, m: tuple[Expression, ...], count: int) -> Array:
+        total = np.ones(count, dtype=np.int64)
+        for e in m:
+            value = draw.constant(e)
+            total = total * (value.x.reshape(-1) if isinstance(value, Fp) else value) % self.p
+        return total
 
-        return self.K.convert(QQ(c.numerator, c.denominator))
+    def _fraction(self, M: Array, Q: Sequence[tuple[Expression, ...]], P: Sequence[tuple[Expression, ...]]) -> Expression | None:
+        pivots, R = rref(M, self.p)
+        free = next((c for c in range(M.shape[1]) if c not in pivots), None)
+        if free is None:
+            return None
+        vector = {c: -int(R[i, free]) % self.p for i, c in enumerate(pivots) if c < free} | {free: 1}
+        entries = {c: small_rational(x, self.p) for c, x in vector.items() if x}
+        if any(c is None for c in entries.values()):
+            return None
+        products = [*Q, *P]
+        sides = [Expression(), Expression()]
+        for c, value in entries.items():
+            term = ONE
+            for e in products[c]:
+                term = term * e
+            sides[c >= len(Q)] += term * (value or Fraction(0))
+        denominator, numerator = sides
+        if not denominator:
+            return None
+        lead = denominator.terms[next(iter(denominator.terms))]
+        return numerator * (1 / lead) * (denominator * (1 / lead)).inverse()
 
-    def _call(self, function: str, argument: Expression) -> Any:
-        if function in ("cos", "sin"):
-            return self._angle(argument)[function == "sin"]
-        if function == "inv":
-            return 1 / self.lift(self.constant(argument))
-        raise SymgenError(f"no exact coefficient with {function}({argument}) in the geometry; declare {function}({argument}) as a constant of its own")
-
-    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
-        point = self._angle(offset)
-        for j, n in turn:
-            point = self._turned(point, self._multiple(self._point(self._value("t", j)), n))
-        return point
-
-    def q(self, j: int) -> Any:
-        return self._value("q", j)
-
-    def qd(self, j: int) -> Any:
-        return self._value("qd", j)
-
-    def qdd(self, j: int) -> Any:
-        return self._value("qdd", j)
-
-    def sign(self, rate: Scalar, row: tuple[tuple[int, Expression], ...]) -> Any:
-        return self._value(f"b{row}", 0)
-
-    def one_sided(self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str) -> tuple[Scalar, Scalar]:
-        b = (self._value(f"b{row}", 0) + 1) / 2
-        return (b, b * rate) if when == "positive" else (b - 1, (1 - b) * rate)
-
-    def name(self, value: Scalar, name: str) -> Scalar:
-        return value
-
-    hint = name
-
-    def section(self, title: str) -> None:
-        pass
-
-    def solve(self, rows: list[list[Any]], wanted: int, dependent: str) -> list[Expression]:
-        from sympy.polys.matrices import DomainMatrix
-
-        M = DomainMatrix(rows, (len(rows), wanted + 1), self.K)
-        R, pivots = M.rref()
-        if pivots != tuple(range(wanted)):
-            raise SymgenError(f"the exact relation of {dependent} has no unique solution; this geometry is degenerate")
-        return [self._expression(R[k, wanted].element) for k in range(wanted)]
-
-    def _expression(self, x: Any) -> Expression:
-        """A field element as an expression; a half-angle tangent t of angle a is sin(a)/(1 + cos(a))."""
-        atoms: list[Expression] = []
-        for name in self.robot.constants:
-            atoms.append(Expression.symbol(name))
-        for m in self.angles:
-            half = Expression({m: Fraction(1, 2 * self.denominators[m])})
-            atoms.append(call("tan", half))
-
-        def polynomial(f: Any) -> Expression:
-            total = Expression()
-            for exponents, c in f.terms():
-                term = Expression.number(Fraction(int(c.numerator), int(c.denominator)))
-                for atom, n in zip(atoms, exponents, strict=True):
-                    if n:
-                        term = term * atom**n
-                total = total + term
-            return total
-
-        numerator, denominator = polynomial(x.numer), polynomial(x.denom)
-        return numerator * denominator.inverse()
