@@ -79,7 +79,8 @@ def _false_identities(regrouping: Regrouping, draw: Draw, W: Array, index: dict[
 def numeric_rank(W: Array, *, tolerance: float = 1e-9) -> tuple[int, float]:
     """Rank of a float matrix by SVD after scaling its columns, and the gap s_rank / s_(rank+1)."""
     norms = np.linalg.norm(W, axis=0)
-    s = np.linalg.svd(W[:, norms > 0] / norms[norms > 0], compute_uv=False)
+    acts = norms > 1e-12 * norms.max(initial=0.0)  # below: rounding of a column without effect
+    s = np.linalg.svd(W[:, acts] / norms[acts], compute_uv=False)
     rank = int(np.sum(s > tolerance * s[0]))
     gap = float(s[rank - 1] / max(s[rank], np.finfo(float).tiny)) if rank < s.size else float("inf")
     return rank, gap

@@ -1,0 +1,108 @@
+"""The certificate holds for what is right and refuses what is wrong: mutated coefficients, a mutated recursion, a wrong base."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from oracles.random_robots import describe_mix, random_robot
+from symgen.derive import newton_euler
+from symgen.derive.lagrange import numeric_regressor
+from symgen.description import Robot, load_robot, packaged_robots
+from symgen.description.expression import Expression
+from symgen.regroup.certificate import certify, numeric_rank
+from symgen.regroup.regrouping import BaseParameter, Regrouping, regroup
+
+RANDOM = range(250)
+
+
+@pytest.mark.parametrize("name", packaged_robots())
+def test_packaged_robots_are_certified(name: str) -> None:
+    certificate = certify(regroup(load_robot(name)))
+    assert certificate.valid, certificate.failures
+    assert certificate.rank == certificate.count
+
+
+def flipped(regrouping: Regrouping, k: int, name: str) -> Regrouping:
+    """The same with the sign of one coefficient turned."""
+    b = regrouping.base[k]
+    wrong = BaseParameter(b.name, b.own, {**b.combination, name: -b.combination[name]})
+    return replace(regrouping, base=(*regrouping.base[:k], wrong, *regrouping.base[k + 1 :]))
+
+
+def coefficients(regrouping: Regrouping) -> list[tuple[int, str]]:
+    return [(k, name) for k, b in enumerate(regrouping.base) for name in b.combination if name != b.own]
+
+
+@pytest.mark.parametrize("name", ["tx40", "stanford", "two_branch"])
+def test_every_flipped_coefficient_is_caught(name: str) -> None:
+    regrouping = regroup(load_robot(name))
+    for k, parameter in coefficients(regrouping):
+        assert not certify(flipped(regrouping, k, parameter)).valid, (regrouping.base[k].name, parameter)
+
+
+def test_a_slightly_wrong_coefficient_is_caught() -> None:
+    regrouping = regroup(load_robot("tx40"))
+    b = regrouping.base[0]
+    wrong = BaseParameter(b.name, b.own, {**b.combination, "M4": b.combination["M4"] + Expression.number("0.001")})
+    assert not certify(replace(regrouping, base=(wrong, *regrouping.base[1:]))).valid
+
+
+def test_a_dependent_base_is_caught() -> None:
+    """One parameter too many: the rank shows it."""
+    regrouping = regroup(load_robot("planar_2r"))
+    extra = BaseParameter("M2", "M2", {"M2": Expression.number(1)})
+    certificate = certify(replace(regrouping, base=(*regrouping.base, extra)))
+    assert not certificate.valid and certificate.rank == len(regrouping)
+
+
+def test_a_missing_base_parameter_is_caught() -> None:
+    regrouping = regroup(load_robot("planar_2r"))
+    assert not certify(replace(regrouping, base=regrouping.base[1:])).valid
+
+
+def test_a_mutated_recursion_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One sign in U: the general rules are theorems of mechanics, so the wrong columns do not obey them."""
+    right = newton_euler.Motion._products
+
+    def wrong(self, w, wd, j):
+        DV, DW, U = right(self, w, wd, j)
+        return DV, DW, (U[0], (U[1][0], U[1][1], -U[1][2]), U[2])
+
+    monkeypatch.setattr(newton_euler.Motion, "_products", wrong)
+    regrouping = regroup(load_robot("tx40"))
+    assert not certify(regrouping).valid
+
+
+def test_random_robots_exactly_and_numerically(capsys: pytest.CaptureFixture[str]) -> None:
+    """250 robots: exact rank = SVD rank of the CasADi regressor; coefficients = its least-squares fit to 1e-10."""
+    robots = [random_robot(seed) for seed in RANDOM]
+    with capsys.disabled():
+        print("\nrandom robots:", describe_mix(robots))
+    for robot in robots:
+        regrouping = regroup(robot)
+        certificate = certify(regrouping)
+        assert certificate.valid, (robot.name, certificate.failures)
+        check_numerically(robot, regrouping)
+
+
+def check_numerically(robot: Robot, regrouping: Regrouping) -> None:
+    n_states = 3 * len(robot.parameters) // len(robot.joints) + 10
+    W, names = numeric_regressor(robot, n_states, seed=9)
+    rank, _ = numeric_rank(W)
+    assert rank == len(regrouping), robot.name
+    columns = [names.index(name) for name in regrouping.own]
+    scale = np.linalg.norm(W[:, columns], axis=0)
+    fit, *_ = np.linalg.lstsq(W[:, columns] / scale, W, rcond=None)
+    K = np.array([[b.combination[name].value(robot.constants) if name in b.combination else 0.0 for name in names] for b in regrouping.base])
+    difference = fit / scale[:, None] - K
+    assert np.abs(difference * scale[:, None]).max() <= 1e-10 * np.abs(fit).max(), robot.name
+
+
+@pytest.mark.parametrize("seed", range(0, 250, 10))
+def test_flipped_coefficients_of_random_robots(seed: int) -> None:
+    regrouping = regroup(random_robot(seed))
+    for k, name in coefficients(regrouping):
+        assert not certify(flipped(regrouping, k, name)).valid, (regrouping.base[k].name, name)
