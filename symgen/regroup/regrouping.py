@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from symgen.derive.columns import element_names, inertial_names
-from symgen.description.expression import ONE, ZERO, Expression
+from symgen.description.expression import ONE, ZERO, Call, Expression
 from symgen.description.robot import PRISMATIC, Robot
-from symgen.regroup.finite_field import Draw, rref
+from symgen.regroup.finite_field import Draw, Fp, rref
 from symgen.regroup.rules import Combination, Step, Transfer
 from symgen.regroup.solve import coefficients, sample, states_for
 
@@ -71,7 +71,7 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
             into = combination[target]
             for name, value in transfer.combination[names[c]].items():
                 into[name] = into.get(name, ZERO) + beta * value
-    return _assemble(robot, combination, steps)
+    return _assemble(robot, combination, steps, draw)
 
 
 def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -94,23 +94,29 @@ def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(sorted(names, key=rank))
 
 
-def _assemble(robot: Robot, combination: dict[str, Combination], steps: list[Step]) -> Regrouping:
+def _assemble(robot: Robot, combination: dict[str, Combination], steps: list[Step], draw: Draw) -> Regrouping:
     order = {name: k for k, name in enumerate(robot.parameters)}
     base: list[BaseParameter] = []
     used: set[str] = set()
     for own in sorted(combination, key=order.__getitem__):
         terms = {name: simplified(c) for name, c in combination[own].items()}
-        terms = {name: c for name, c in sorted(terms.items(), key=lambda nc: (nc[0] != own, order[nc[0]])) if c}
+        terms = {name: c for name, c in sorted(terms.items(), key=lambda nc: (nc[0] != own, order[nc[0]])) if not _vanishes(c, draw)}
         used |= set(terms)
         base.append(BaseParameter(own if terms == {own: ONE} else own + "R", own, terms))
     no_effect = tuple(name for name in robot.parameters if name not in used)
     return Regrouping(robot, tuple(base), no_effect, tuple(steps))
 
 
+def _vanishes(c: Expression, draw: Draw) -> bool:
+    """Whether a coefficient is zero, cos(pi/4)**2 - sin(pi/4)**2 included: angles are exact over F_p."""
+    if not any(isinstance(a, Call) for a in c.atoms):
+        return not c
+    value = draw.constant(c)
+    return not value.x.any() if isinstance(value, Fp) else value == 0
+
+
 def simplified(e: Expression) -> Expression:
     """cos(a)**2 m + sin(a)**2 m = m wherever both are there with one coefficient."""
-    from symgen.description.expression import Call
-
     changed = True
     while changed:
         changed = False

@@ -1,0 +1,146 @@
+"""Behaviour of the emitted module at its border: stores, blocks, single states, constants, hostile texts, colliding names."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from symgen.description import Robot, load_robot, parse_robot
+from symgen.emit import generate_module
+from symgen.errors import SymgenError
+
+
+def loaded(robot: Robot) -> ModuleType:
+    module = ModuleType(robot.name)
+    exec(compile(generate_module(robot), robot.name, "exec"), module.__dict__)  # noqa: S102 (our own output)
+    return module
+
+
+@pytest.fixture(scope="module")
+def tx40() -> ModuleType:
+    return loaded(load_robot("tx40"))
+
+
+def states(n: int, N: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal((3, N, n))
+
+
+def test_store_is_reused_and_its_zeros_stay(tx40: ModuleType) -> None:
+    out = tx40.store(50)
+    first = tx40.regressor(*states(6, 50, 1), out=out).copy()
+    second = tx40.regressor(*states(6, 50, 2), out=out)
+    assert np.shares_memory(second, out)
+    assert np.array_equal(second, tx40.regressor(*states(6, 50, 2)))
+    assert not np.array_equal(first, second)
+    assert not second[:, ~tx40.STRUCTURE.T].any()
+
+
+def test_layout(tx40: ModuleType) -> None:
+    """D is a view on (b, n, N); W is the same store in Fortran order, rows joint-major."""
+    out = tx40.store(7)
+    D, W = tx40.regressor(*states(6, 7), out=out), tx40.observation_matrix(*states(6, 7), out=out)
+    assert D.shape == (7, 6, 60) and W.shape == (42, 60)
+    assert W.flags.f_contiguous and np.shares_memory(W, out) and np.shares_memory(D, out)
+    assert np.array_equal(W[2 * 7 + 3], D[3, 2])
+
+
+@pytest.mark.parametrize("wrong", ["zeros", "view", "copy", "size", "empty_like"])
+def test_a_store_that_store_did_not_make_is_refused(tx40: ModuleType, wrong: str) -> None:
+    made = tx40.store(5)
+    out = {
+        "zeros": np.zeros((60, 6, 5)),
+        "view": made[:, :, :],
+        "copy": made.copy(),
+        "size": tx40.store(4),
+        "empty_like": np.empty_like(made),
+    }[wrong]
+    with pytest.raises(ValueError, match=r"expected store\(5\)"):
+        tx40.regressor(*states(6, 5), out=out)
+
+
+def test_blocks_do_not_show(tx40: ModuleType) -> None:
+    """Around the block length: every sample as when it is evaluated alone."""
+    q, qd, qdd = states(6, 8200)
+    X = np.random.default_rng(3).standard_normal(60)
+    tau = tx40.inverse_dynamics(q, qd, qdd, X)
+    for t in (0, 4095, 4096, 8191, 8192, 8199):
+        assert np.allclose(tau[t], tx40.inverse_dynamics(q[t], qd[t], qdd[t], X), rtol=1e-13, atol=1e-13)
+    assert tx40.regressor(np.zeros((0, 6)), np.zeros((0, 6)), np.zeros((0, 6))).shape == (0, 6, 60)
+
+
+def test_one_state_has_no_leading_axis(tx40: ModuleType) -> None:
+    q, qd, qdd = (x[0] for x in states(6, 1))
+    X = np.ones(60)
+    assert tx40.regressor(q, qd, qdd).shape == (6, 60)
+    assert tx40.inverse_dynamics(q, qd, qdd, X).shape == (6,)
+    assert tx40.inertia_matrix(q, X).shape == (6, 6)
+    assert tx40.frame_poses(q).shape == (6, 4, 4)
+    assert tx40.jacobian(q).shape == (6, 6)
+    assert tx40.jacobian(q, frame=3).shape == (6, 6)
+    assert tx40.forward_dynamics(q, qd, qdd, tx40.base_parameters(tx40.VALUES)).shape == (6,)
+
+
+def test_constants_are_keyword_arguments(tx40: ModuleType) -> None:
+    """Calibration needs no new code: another length is another argument, in the regressor and in the formulas."""
+    q, qd, qdd = states(6, 4)
+    chi = np.random.default_rng(4).standard_normal(86)
+    longer = {"D3": 0.3, "RL4": 0.2, "g": 1.62}
+    X = tx40.base_parameters(chi, **longer)
+    assert np.allclose(
+        tx40.regressor(q, qd, qdd, **longer) @ X, tx40.inverse_dynamics(q, qd, qdd, X, **longer), rtol=1e-12, atol=1e-12
+    )
+    assert not np.allclose(X, tx40.base_parameters(chi))
+
+
+def test_packaged_values_move(tx40: ModuleType) -> None:
+    X = tx40.base_parameters(tx40.VALUES)
+    A = tx40.inertia_matrix(states(6, 200)[0] * 3, X)
+    assert np.allclose(A, A.transpose(0, 2, 1)) and np.linalg.eigvalsh(A).min() > 0
+
+
+ARM = """
+symgen: 1
+name: arm
+title: '{title}'
+gravity: [0, 0, -g]
+constants: {{{constant}: 0.5, g: 9.81}}
+frames:
+  1: {{ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}}
+  2: {{ant: 1, sigma: 0, alpha: pi/2, d: {constant}, theta: q2, r: 0}}
+  3: {{ant: 2, sigma: 1, alpha: pi/2, d: 0, theta: 0, r: q3}}
+elements:
+  FS: {{kind: coulomb, along: all}}
+"""
+
+
+def arm(title: str = "arm", constant: str = "L2") -> Robot:
+    return parse_robot(ARM.format(title=title, constant=constant).encode(), "arm.yaml")
+
+
+@pytest.mark.parametrize("title", ["{{ 7*7 }}", "#}{% raw %}", "%s {0} N{{DIGIT ONE}}", "a # b; import os"])
+def test_titles_stay_text(title: str) -> None:
+    """A title cannot add a statement: the syntax tree but for the docstring is that of a plain title."""
+
+    def code(text: str) -> str:
+        tree = ast.parse(text)
+        return ast.dump(ast.Module(tree.body[1:], []))
+
+    def without_hash(robot: Robot) -> Robot:
+        return replace(robot, sha256="")
+
+    plain, hostile = arm(), arm(title=title.replace("'", "''"))
+    assert code(generate_module(without_hash(hostile))) == code(generate_module(without_hash(plain)))
+
+
+@pytest.mark.parametrize("constant", ["C2", "W12", "VP13", "S2"])
+def test_a_constant_named_as_a_quantity_is_refused(constant: str) -> None:
+    with pytest.raises(SymgenError, match=constant):
+        generate_module(arm(constant=constant))
+
+
+def test_same_bytes_twice() -> None:
+    assert generate_module(load_robot("two_branch")) == generate_module(load_robot("two_branch"))
