@@ -95,7 +95,5 @@ class GraphAlgebra:
     def name(self, value: Scalar, name: str) -> Scalar:
         return self.graph.name(value, name)
 
-
-
     def hint(self, value: Scalar, name: str) -> Scalar:
         return self.graph.hint(value, name)

@@ -32,7 +32,9 @@ class Closure:
 
     def _passive(self, j: int) -> None:
         if j not in self.robot.constraints:
-            raise DescriptionError(f"passive joint {j} has no relation to the actuated joints; declare it under constraints", path=("frames", j))
+            raise DescriptionError(
+                f"passive joint {j} has no relation to the actuated joints; declare it under constraints", path=("frames", j)
+            )
         e = self.robot.constraints[j]
         while unknown := [i for i in self.robot.passive if f"q{i}" in e.symbols]:
             if j in unknown or any(i not in self.robot.constraints for i in unknown):
@@ -55,7 +57,9 @@ class Closure:
         for i, g in sorted(self.row[j].items()):
             c = g.constant
             if c is None or c.denominator != 1:
-                raise DescriptionError(f"constraint on q{j}: {g}*q{i}; a passive angle needs whole multiples of actuated angles", path=("constraints", f"q{j}"))
+                raise DescriptionError(
+                    f"constraint on q{j}: {g}*q{i}; a passive angle needs whole multiples of actuated angles", path=("constraints", f"q{j}")
+                )
             turn.append((i, int(c)))
         return tuple(turn), self.offset[j]
 
@@ -76,7 +80,7 @@ class Closure:
 
     def project(self, algebra: Algebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
         """G' Gamma_tree, by actuated joint."""
-        active: dict[int, Scalar] = {i: 0 for i in self.robot.joints}
+        active: dict[int, Scalar] = dict.fromkeys(self.robot.joints, 0)
         for j, value in torque.items():
             for i, g in self.row[j].items():
                 active[i] = add(active[i], mul(algebra.constant(g), value))

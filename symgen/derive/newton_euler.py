@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 from symgen.derive.geometry import Geometry
 from symgen.derive.names import Names
-from symgen.derive.scalar import ZERO3, Algebra, Matrix, Scalar, Vector, add, apply, cross, dot, mul, scale, sub, vadd
+from symgen.derive.scalar import ZERO3, Matrix, Scalar, Vector, add, apply, cross, dot, mul, scale, sub, vadd
 from symgen.description.expression import Expression
-from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Robot, parameter
+from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, parameter
 
 ZERO33: Matrix = (ZERO3, ZERO3, ZERO3)
 TWO = Expression.number(2)
@@ -57,7 +57,7 @@ class Motion:
         self._qd = {i: self.algebra.qd(i) if velocity and unit is None else 0 for i in joints}
         self._qdd = {i: int(i == unit) if unit is not None else self.algebra.qdd(i) if acceleration else 0 for i in joints}
         g = tuple(self.algebra.constant(-e) for e in self.robot.gravity) if self.gravity else ZERO3
-        self.link: dict[int, LinkMotion] = {0: LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, g)}  # type: ignore[arg-type]
+        self.link: dict[int, LinkMotion] = {0: LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, g)}
         for f in self.robot.frames:
             self.link[f.j] = self._link(f.j)
 
@@ -119,7 +119,7 @@ class Motion:
             (off(2, 1, add(DV[0][1], wd[2])), off(2, 2, -add(DV[0][0], DV[2][2])), off(2, 3, sub(DV[1][2], wd[0]))),
             (off(3, 1, sub(DV[0][2], wd[1])), off(3, 2, add(DV[1][2], wd[0])), off(3, 3, -add(DV[0][0], DV[1][1]))),
         )
-        return DV, DW, U  # type: ignore[return-value]
+        return DV, DW, U
 
 
 def force(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:

@@ -50,7 +50,11 @@ def frame_table(robot: Robot) -> list[str]:
 
 
 def _informative(column: str, rows: Sequence[Sequence[str]], k: int) -> bool:
-    return any(row[k] != "0" for row in rows) if column != "mu" else any(row[k] == "0" and row[COLUMNS.index("sigma")] != str(FIXED) for row in rows)
+    return (
+        any(row[k] != "0" for row in rows)
+        if column != "mu"
+        else any(row[k] == "0" and row[COLUMNS.index("sigma")] != str(FIXED) for row in rows)
+    )
 
 
 def element_lines(robot: Robot) -> list[str]:
@@ -74,7 +78,11 @@ def _times(c: Any, name: str) -> str:
 
 
 def _form_text(form: Mapping[tuple[int, int], Any]) -> str:
-    parts = [_times(c * (1 if i == j else 2), f"q{i}**2" if i == j else f"q{i}*q{j}") for (i, j), c in sorted(form.items(), reverse=True) if i <= j]
+    parts = [
+        _times(c * (1 if i == j else 2), f"q{i}**2" if i == j else f"q{i}*q{j}")
+        for (i, j), c in sorted(form.items(), reverse=True)
+        if i <= j
+    ]
     return " + ".join(parts)
 
 
@@ -92,7 +100,7 @@ def tables(spec: ModuleSpec) -> list[str]:
         *literal("UNITS", {b.name: unit(robot, b.own) for b in regrouping.base}),
         *literal("FORMULAS", {b.name: b.formula for b in regrouping.base}),
         *literal("NO_EFFECT", regrouping.no_effect),
-        "STRUCTURE = np.array([[mark == \"x\" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j",
+        'STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j',
         *(f"    {line}" for line in _marks(spec)),
         ")])",
         *_drives(robot),
@@ -108,8 +116,11 @@ def _drives(robot: Robot) -> list[str]:
     rows = [f"        {row!r}," for row in d.ratio]
     return [
         "DRIVES = {  # qm = ratio (q - offset), tau = ratio' (torque_constant * u)",
-        "    'ratio': (", *rows, "    ),",
-        f"    'offset': {d.offset!r},", f"    'torque_constant': {d.torque_constant!r},",
+        "    'ratio': (",
+        *rows,
+        "    ),",
+        f"    'offset': {d.offset!r},",
+        f"    'torque_constant': {d.torque_constant!r},",
         "}",
     ]
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from symgen.derive.graph import ADD, CONST, COS, INV, MUL, POS, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
+from symgen.derive.graph import ADD, CONST, COS, INV, MUL, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
 from symgen.errors import SymgenError
 
 CALLS = {COS: "np.cos", SIN: "np.sin", SIGN: "np.sign", SQRT: "np.sqrt"}
@@ -178,12 +178,11 @@ class Text:
 
     def _product(self, s: Scalar) -> str:
         sign, factors = s.sign, []
-        stack = [x for x in s.node.operands]
-        a, b = stack
+        a, b = s.node.operands
         if a.node is b.node:
             square = f"{self._factor(Scalar(None, a.node, self._name_sign(a.node)))}**2"  # type: ignore[arg-type]
             return ("-" if sign < 0 else "") + square
-        for x in sorted(stack, key=lambda x: not x.node.fixed):
+        for x in sorted((a, b), key=lambda x: not x.node.fixed):
             name_sign = self._name_sign(x.node) if x.node.index in self.called else 1
             sign *= x.sign * name_sign
             factors.append(self._factor(Scalar(None, x.node, name_sign)))  # type: ignore[arg-type]
@@ -191,7 +190,7 @@ class Text:
 
     def _factor(self, s: Scalar) -> str:
         text = self._operand(s)
-        return f"({text})" if s.node.index not in self.called and s.node.op in (ADD, INV) or text.startswith("-") else text
+        return f"({text})" if (s.node.index not in self.called and s.node.op in (ADD, INV)) or text.startswith("-") else text
 
 
 def number(c: Fraction) -> str:

@@ -19,7 +19,10 @@ BLOCK = 4096
 SUMMARIES = {
     "regressor": ("q, qd, qdd, D", "Fill D, shape ({b}, {n}, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: ({n}, N)."),
     "inverse_dynamics": ("q, qd, qdd, GAM, X", "Fill GAM, shape ({n}, N). q, qd, qdd: ({n}, N)."),
-    "inertia_matrix": ("q, A, X", "Fill A, shape ({n}, {n}, N): column i is Gamma for a unit acceleration of joint i from rest. q: ({n}, N)."),
+    "inertia_matrix": (
+        "q, A, X",
+        "Fill A, shape ({n}, {n}, N): column i is Gamma for a unit acceleration of joint i from rest. q: ({n}, N).",
+    ),
     "bias": ("q, qd, GAM, X", "Fill GAM, shape ({n}, N), for qdd = 0. q, qd: ({n}, N)."),
     "gravity": ("q, GAM, X", "Fill GAM, shape ({n}, N), at rest. q: ({n}, N)."),
     "frame_poses": ("q, T", "Fill T, shape ({frames}, 4, 4, N). q: ({n}, N)."),
@@ -41,14 +44,22 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     sizes = {"n": len(robot.joints), "b": len(regrouping), "frames": len(robot.frames), "p": len(robot.parameters)}
     context = {
         **sizes,
-        "title": plain(robot.title or robot.name), "file": plain(robot.file or robot.name), "sha256": robot.sha256,
-        "version": VERSION, "command": plain(command or robot.file or robot.name), "size": BLOCK,
-        "header": [plain(line) for line in header(spec)], "tables": [*tables(spec), *_paths(robot)],
+        "title": plain(robot.title or robot.name),
+        "file": plain(robot.file or robot.name),
+        "sha256": robot.sha256,
+        "version": VERSION,
+        "command": plain(command or robot.file or robot.name),
+        "size": BLOCK,
+        "header": [plain(line) for line in header(spec)],
+        "tables": [*tables(spec), *_paths(robot)],
         "constant_entries": spec.constant_entries,
         "constants": "".join(f", {name}" for name in constants),
         "passed": "".join(f", {name}={name}" for name in constants),
-        "defaults": defaults, "keywords": ", *" + defaults if constants else "",
-        "unpack": _unpack(robot), "formulas": _formulas(spec), "packed": packed(list(regrouping.names)),
+        "defaults": defaults,
+        "keywords": ", *" + defaults if constants else "",
+        "unpack": _unpack(robot),
+        "formulas": _formulas(spec),
+        "packed": packed(list(regrouping.names)),
         "blocks": [_block(name, getattr(spec, name), sizes, constants) for name in SUMMARIES],
     }
     return _environment().get_template("module.py.jinja").render(context)
@@ -63,7 +74,10 @@ def _block(name: str, function: Function, sizes: dict[str, int], constants: list
     arguments, summary = SUMMARIES[name]
     sections = function.sections or (Section("Nothing acts", ("pass",)),)
     return {
-        "name": f"_{name}_block", "arguments": ", ".join([arguments, *constants]), "summary": summary.format(**sizes), "sections": sections,
+        "name": f"_{name}_block",
+        "arguments": ", ".join([arguments, *constants]),
+        "summary": summary.format(**sizes),
+        "sections": sections,
     }
 
 
@@ -90,5 +104,7 @@ def _paths(robot: Robot) -> list[str]:
     paths = {}
     for f in robot.frames:
         moving = [robot.frame(i) for i in robot.path(f.j) if robot.frame(i).sigma != FIXED]
-        paths[f.j] = tuple((m.j, m.sigma, tuple((column[i], float(g.value(robot.constants))) for i, g in closure.row[m.j].items())) for m in moving)
+        paths[f.j] = tuple(
+            (m.j, m.sigma, tuple((column[i], float(g.value(robot.constants))) for i, g in closure.row[m.j].items())) for m in moving
+        )
     return literal("_PATHS", paths)

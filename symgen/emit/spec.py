@@ -216,7 +216,10 @@ def unit(robot: Robot, name: str) -> str:
     e, j = element_names(robot)[name]
     slides = robot.frame(j).sigma == PRISMATIC
     table = {
-        "inertia": ("kg*m**2", "kg"), "viscous": ("N*m*s/rad", "N*s/m"), "coulomb": ("N*m", "N"), "offset": ("N*m", "N"),
+        "inertia": ("kg*m**2", "kg"),
+        "viscous": ("N*m*s/rad", "N*s/m"),
+        "coulomb": ("N*m", "N"),
+        "offset": ("N*m", "N"),
         "stiffness": ("N*m/rad", "N/m"),
     }
     return table[e.kind][slides]
@@ -232,5 +235,3 @@ def is_inertial_or_actuator(robot: Robot) -> Callable[[str], bool]:
     """Whether a standard parameter is inertial or the inertia of an actuator."""
     inertial, elements = inertial_names(robot), element_names(robot)
     return lambda own: own in inertial or elements[own][0].kind == "inertia"
-
-

@@ -69,7 +69,9 @@ class Program:
             case "mul":
                 return x[0] * x[1]
         y = graph.lift(x[0])
-        return {COS: graph.cos, SIN: graph.sin, SIGN: graph.sign, POS: graph.positive_part, SQRT: graph.sqrt, INV: graph.inverse}[node.op](y)
+        return {COS: graph.cos, SIN: graph.sin, SIGN: graph.sign, POS: graph.positive_part, SQRT: graph.sqrt, INV: graph.inverse}[node.op](
+            y
+        )
 
     def _numbered(self, image: Scalar, value: Array) -> Scalar | int:
         """`image`, or the equal node that was there before; `value` is that of the node, without the sign of the edge."""
@@ -141,5 +143,3 @@ class Program:
             return self._rng.integers(1, self.p, 1)
         kind, j = name.rstrip("0123456789"), int(name[len(name.rstrip("0123456789")) :])
         return {"q": self.draw.q, "QP": self.draw.qd, "QDP": self.draw.qdd}[kind](j).x
-
-

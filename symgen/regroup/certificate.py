@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-
 from symgen.regroup.finite_field import Array, Draw, Fp, angle_denominators, primes_for, rref
 from symgen.regroup.regrouping import Regrouping
 from symgen.regroup.solve import sample, states_for
@@ -40,8 +39,12 @@ class Certificate:
 
     def mapping(self) -> dict[str, object]:
         return {
-            "valid": self.valid, "count": self.count, "rank": self.rank, "primes": list(self.primes),
-            "identities": self.identities, "failures": list(self.failures),
+            "valid": self.valid,
+            "count": self.count,
+            "rank": self.rank,
+            "primes": list(self.primes),
+            "identities": self.identities,
+            "failures": list(self.failures),
         }
 
 
@@ -84,6 +87,3 @@ def numeric_rank(W: Array, *, tolerance: float = 1e-9) -> tuple[int, float]:
     rank = int(np.sum(s > tolerance * s[0]))
     gap = float(s[rank - 1] / max(s[rank], np.finfo(float).tiny)) if rank < s.size else float("inf")
     return rank, gap
-
-
-

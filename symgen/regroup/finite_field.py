@@ -145,7 +145,14 @@ class Draw:
     """
 
     def __init__(
-        self, robot: Robot, seed: int, samples: int, *, p: int | None = None, geometry: Mapping[str | Monomial, Array] | None = None, count: int = 0
+        self,
+        robot: Robot,
+        seed: int,
+        samples: int,
+        *,
+        p: int | None = None,
+        geometry: Mapping[str | Monomial, Array] | None = None,
+        count: int = 0,
     ) -> None:
         self.robot, self.samples = robot, samples
         self.shape = (count, samples) if geometry is not None else (samples,)

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from symgen.derive.scalar import apply
 from symgen.description.expression import ONE, ZERO, Expression, call
-from symgen.description.robot import INERTIAL, REVOLUTE, PRISMATIC, Frame, Robot, parameter
+from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, parameter
 
 TENSOR = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
 FIRST = ("MX", "MY", "MZ")
@@ -48,7 +48,10 @@ class Transfer:
 
     def _link(self, frame: Frame) -> None:
         for name, image in link_relations(frame).items():
-            self._move(parameter(name, frame.j), {(parameter(k, frame.ant if at else frame.j)): c for (k, at), c in image.items() if at == 0 or frame.ant})
+            self._move(
+                parameter(name, frame.j),
+                {(parameter(k, frame.ant if at else frame.j)): c for (k, at), c in image.items() if at == 0 or frame.ant},
+            )
 
     def _move(self, source: str, image: Combination) -> None:
         """Remove the column `source` = sum_k image_k column k."""

@@ -53,13 +53,13 @@ def coefficients(robot: Robot, dependent: str, support: tuple[str, ...]) -> list
     for free_pi in (True, False):  # fractions of pi as any angle, if the relation holds for any; else at their exact values
         try:
             return _Relation(robot, dependent, support, free_pi).coefficients()
-        except _NotRecognised as error:
+        except _NotRecognisedError as error:
             reason = error
     raise SymgenError(f"{dependent} depends on {', '.join(support)}, but its coefficients were not recognised: {reason}")
 
 
-class _NotRecognised(Exception):
-    pass
+class _NotRecognisedError(Exception):
+    """Why no fraction was found."""
 
 
 class _Relation:
@@ -92,7 +92,7 @@ class _Relation:
         for i in range(count):
             pivots, R = rref(W[i], self.p)
             if pivots != list(range(len(self.names) - 1)):
-                raise _NotRecognised("the relation does not hold for every geometry")
+                raise _NotRecognisedError("the relation does not hold for every geometry")
             beta[i] = R[:, -1]
         return beta
 
@@ -102,7 +102,9 @@ class _Relation:
             count = len(P) + len(Q) + 4
             if count > MAX_UNKNOWNS or (numerator and not angles and not any(isinstance(v, str) for v in matters)):
                 continue
-            geometry = {v: self.rng.integers(2, self.p, (count, 1)) if v in matters else np.repeat(reference[v], count, 0) for v in self.variables}
+            geometry = {
+                v: self.rng.integers(2, self.p, (count, 1)) if v in matters else np.repeat(reference[v], count, 0) for v in self.variables
+            }
             beta = self.residues(geometry, count)[:, k]
             values = Draw(self.robot, 11, 1, geometry=geometry, count=count)
             p_columns = [self._value(values, m, count) for m in P]
@@ -110,7 +112,7 @@ class _Relation:
             found = self._fraction(np.stack([*q_columns, *p_columns], axis=1), Q, P)
             if found is not None:
                 return found
-        raise _NotRecognised(f"no fraction of degree up to {DEGREES[-1]} in {', '.join(map(str, matters))}")
+        raise _NotRecognisedError(f"no fraction of degree up to {DEGREES[-1]} in {', '.join(map(str, matters))}")
 
     def _choices(self, matters: Sequence[Variable]) -> list[tuple[Expression, ...]]:
         """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all."""
@@ -156,4 +158,3 @@ class _Relation:
             return None
         lead = denominator.terms[next(iter(denominator.terms))]
         return numerator * (1 / lead) * (denominator * (1 / lead)).inverse()
-

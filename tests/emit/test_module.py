@@ -90,9 +90,7 @@ def test_constants_are_keyword_arguments(tx40: ModuleType) -> None:
     chi = np.random.default_rng(4).standard_normal(86)
     longer = {"D3": 0.3, "RL4": 0.2, "g": 1.62}
     X = tx40.base_parameters(chi, **longer)
-    assert np.allclose(
-        tx40.regressor(q, qd, qdd, **longer) @ X, tx40.inverse_dynamics(q, qd, qdd, X, **longer), rtol=1e-12, atol=1e-12
-    )
+    assert np.allclose(tx40.regressor(q, qd, qdd, **longer) @ X, tx40.inverse_dynamics(q, qd, qdd, X, **longer), rtol=1e-12, atol=1e-12)
     assert not np.allclose(X, tx40.base_parameters(chi))
 
 

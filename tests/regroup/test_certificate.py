@@ -98,7 +98,9 @@ def check_numerically(robot: Robot, regrouping: Regrouping) -> None:
     columns = [names.index(name) for name in regrouping.own]
     scale = np.linalg.norm(W[:, columns], axis=0)
     fit, *_ = np.linalg.lstsq(W[:, columns] / scale, W, rcond=None)
-    K = np.array([[b.combination[name].value(robot.constants) if name in b.combination else 0.0 for name in names] for b in regrouping.base])
+    K = np.array(
+        [[b.combination[name].value(robot.constants) if name in b.combination else 0.0 for name in names] for b in regrouping.base]
+    )
     difference = fit / scale[:, None] - K
     assert np.abs(difference * scale[:, None]).max() <= 1e-10 * np.abs(fit).max(), robot.name
 
