@@ -30,5 +30,5 @@ def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]
     result: dict[str, dict[int, Scalar]] = {}
     for name in names:
         tree = axes.column(*inertial[name]) if name in inertial else element_column(motion, *elements[name])
-        result[name] = tree if closure.is_trivial else closure.project(algebra, tree)
+        result[name] = closure.project(algebra, tree)
     return result

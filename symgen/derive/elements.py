@@ -41,7 +41,7 @@ def _along(motion: Motion, e: Element, row: Row) -> Scalar:
             rate = motion.algebra.name(rate, motion.named("QP", *row))
         if type(rate) is int:
             return 0  # at rest
-        key = motion.geometry.closure.active_row(row)
+        key = motion.geometry.closure.in_independent(row)
         if e.when is not None:
             direction, speed = motion.algebra.one_sided(rate, key, e.when)
             return direction if e.kind == "coulomb" else speed

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from symgen.derive.loops import Closure
+from symgen.derive.closure import Closure
 from symgen.derive.scalar import ZERO3, Algebra, Matrix, Scalar, Turn, Vector, add, apply, apply_transposed, mul, sub
 from symgen.description.expression import Expression, call
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
@@ -38,7 +38,7 @@ class Rotation:
 
 @dataclass(frozen=True)
 class Carrier:
-    """Frame m of which frame j is turned by `rotation`, about z_j, by the angle `turn` of actuated joints."""
+    """Frame m of which frame j is turned by `rotation`, about z_j, by the angle `turn` of independent joints."""
 
     m: int
     rotation: Rotation
@@ -48,9 +48,8 @@ class Carrier:
 class Geometry:
     """Rotations, positions and carriers of all frames of `robot` over the scalars of `algebra`."""
 
-    def __init__(self, robot: Robot, algebra: Algebra) -> None:
-        self.robot, self.algebra = robot, algebra
-        self.closure = Closure(robot)
+    def __init__(self, robot: Robot, algebra: Algebra, closure: Closure) -> None:
+        self.robot, self.algebra, self.closure = robot, algebra, closure
         self.rotation: dict[int, Rotation] = {}
         self.P: dict[int, Vector] = {}  # P_ij, origin of frame j in frame i = ant(j)
         self.carrier: dict[int, Carrier] = {}
@@ -89,7 +88,7 @@ class Geometry:
         return Rotation(A, c, s)
 
     def position(self, j: int) -> Scalar:
-        """q_j of any moving joint, from the actuated ones."""
+        """q_j of any moving joint, from the independent ones."""
         q = {i: self.algebra.q(i) for i in self.closure.row[j]}
         return add(self.closure.linear(self.algebra, j, q), self.algebra.constant(self.closure.offset[j]))
 

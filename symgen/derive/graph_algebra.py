@@ -84,6 +84,9 @@ class GraphAlgebra:
     def qdd(self, j: int) -> Scalar:
         return self.graph.symbol(f"QDP{j}")
 
+    def rate(self, u: int, i: int) -> Scalar:
+        return self.graph.symbol(self.named("G", u, i))
+
     def sign(self, rate: Scalar, row: ActiveRow) -> Scalar:
         return self.graph.sign(rate)
 

@@ -1,87 +1,302 @@
-"""From the moving joints of the tree to the actuated ones: q = f(qa), G = dq/dqa.
+"""Relations of the passive joints: declared ones checked, linear ones found, and the mobility of the mechanism.
 
-Declared relations are linear, q_j = sum_i n_i q_i + c, with constant n_i; then qd = G qad and qdd = G qadd with the same constant G, and
-
-    Gamma_a = G' Gamma_tree .
-
-Khalil and Dombre 2002, section 10 (parallelogram robots).
+Loop: frame `cut` (one branch) and frame `twin` (sigma 2, other branch) coincide, 0T_cut = 0T_twin. At a numerical solution the passive
+rates are G = -J_u^+ J_a; where G keeps the same whole numbers along a motion, the relation q_u = G q_a + c is linear. It is then
+*proved*: the two frames must coincide identically over F_p, with random lengths, so equal lengths must be equal symbols.
+The second branch of a parallelogram (anti-parallelogram) is not linear and never taken for one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from itertools import product
 
-from symgen.derive.scalar import Algebra, Scalar, add, mul
-from symgen.description.expression import ONE, Expression
-from symgen.description.robot import Robot, row_of
+import numpy as np
+
+from symgen.derive.closure import Closure, open_tree
+from symgen.derive.exact import Draw, Fp, fixed_angles
+from symgen.derive.float_algebra import FloatAlgebra
+from symgen.derive.geometry import Geometry
+from symgen.derive.kinematics import frame_poses
+from symgen.description.expression import ONE, PI, ZERO, Expression
+from symgen.description.robot import REVOLUTE, Loop, Robot, row_of
 from symgen.errors import DescriptionError
 
-ActiveRow = tuple[tuple[int, Expression], ...]
+Array = np.ndarray
+STARTS, STEPS, TOLERANCE = 60, 60, 1e-11
+INDEPENDENT_MOTIONS = 1e-7  # singular values below, relative to the largest, are no constraint
 
 
-class Closure:
-    """Every moving joint as a linear function of the actuated ones."""
+@dataclass(frozen=True)
+class Found:
+    """Linear relations of passive joints in the actuated (and tied) ones; `tied` are the passive joints without one."""
 
-    def __init__(self, robot: Robot) -> None:
-        self.robot = robot
-        self.row: dict[int, dict[int, Expression]] = {j: {j: ONE} for j in robot.joints}
-        self.offset: dict[int, Expression] = {j: Expression() for j in robot.joints}
-        for j in robot.passive:
-            self._passive(j)
+    row: Mapping[int, Mapping[int, Expression]]
+    offset: Mapping[int, Expression]
+    tied: tuple[int, ...]
+    start: Mapping[int, float]
+    """A configuration of all moving joints that closes the loops."""
 
-    def _passive(self, j: int) -> None:
-        if j not in self.robot.constraints:
-            raise DescriptionError(
-                f"passive joint {j} has no relation to the actuated joints; declare it under constraints", path=("frames", j)
-            )
-        e = self.robot.constraints[j]
-        while unknown := [i for i in self.robot.passive if f"q{i}" in e.symbols]:
-            if j in unknown or any(i not in self.robot.constraints for i in unknown):
-                raise DescriptionError(f"constraint q{j} = {e} does not end at actuated joints", path=("constraints", f"q{j}"))
-            e = e.substitute({f"q{i}": self.robot.constraints[i] for i in unknown})
-        constant = e.substitute({f"q{i}": Expression() for i in self.robot.joints})
+
+def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], Expression]]:
+    """{j: (row, constant)} of the constraints of the file, in the joints that have none."""
+    free = [i for i in robot.moving if i not in robot.constraints]
+    relations = {}
+    for j, e in robot.constraints.items():
+        for _ in robot.constraints:
+            e = e.substitute({f"q{i}": robot.constraints[i] for i in robot.constraints})
+        if any(f"q{i}" in e.symbols for i in robot.constraints):
+            raise DescriptionError(f"constraint on q{j} refers to itself: q{j} = {robot.constraints[j]}", path=("constraints", f"q{j}"))
+        constant = e.substitute({f"q{i}": ZERO for i in free})
         try:
-            self.row[j] = row_of(e - constant, self.robot.joints)
+            relations[j] = (row_of(e - constant, tuple(free)), constant)
         except ValueError as error:
             raise DescriptionError(f"constraint q{j}: {error}", path=("constraints", f"q{j}")) from error
-        self.offset[j] = constant
+    return relations
 
-    @cached_property
-    def is_trivial(self) -> bool:
-        return not self.robot.passive
 
-    def turn(self, j: int) -> tuple[tuple[tuple[int, int], ...], Expression]:
-        """The angle of revolute joint j as integer multiples of actuated angles plus a constant."""
-        turn = []
-        for i, g in sorted(self.row[j].items()):
-            c = g.constant
-            if c is None or c.denominator != 1:
-                raise DescriptionError(
-                    f"constraint on q{j}: {g}*q{i}; a passive angle needs whole multiples of actuated angles", path=("constraints", f"q{j}")
-                )
-            turn.append((i, int(c)))
-        return tuple(turn), self.offset[j]
+class LoopEquations:
+    """Closure of all loops in the moving joints that no constraint gives, by numbers."""
 
-    def linear(self, algebra: Algebra, j: int, value: Mapping[int, Scalar]) -> Scalar:
-        """sum_i G_ji value_i."""
-        total: Scalar = 0
-        for i, g in self.row[j].items():
-            total = add(total, mul(algebra.constant(g), value[i]))
-        return total
+    def __init__(self, robot: Robot, relations: Mapping[int, tuple[Mapping[int, Expression], Expression]]) -> None:
+        self.robot = robot
+        self.free = tuple(j for j in robot.moving if j not in relations)
+        self.active = tuple(j for j in self.free if j in robot.joints)
+        self.unknown = tuple(j for j in self.free if j not in robot.joints)
+        values = robot.constants
+        self.rows = {j: ({i: g.value(values) for i, g in row.items()}, c.value(values)) for j, (row, c) in relations.items()}
+        self.length = max([abs(e.value(values)) for f in robot.frames for e in (f.b, f.d, f.r0)] + [1e-3])
 
-    def active_row(self, row: Mapping[int, Expression]) -> ActiveRow:
-        """The row of s = row q in the actuated joints."""
-        total: dict[int, Expression] = {}
-        for j, g in row.items():
-            for i, h in self.row[j].items():
-                total[i] = total.get(i, Expression()) + g * h
-        return tuple(sorted(((i, g) for i, g in total.items() if g), key=lambda ig: ig[0]))
+    def all(self, q: Mapping[int, Array]) -> dict[int, Array]:
+        """All moving joints from the free ones."""
+        return dict(q) | {j: sum((g * q[i] for i, g in row.items()), start=np.asarray(c)) for j, (row, c) in self.rows.items()}
 
-    def project(self, algebra: Algebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
-        """G' Gamma_tree, by actuated joint."""
-        active: dict[int, Scalar] = dict.fromkeys(self.robot.joints, 0)
-        for j, value in torque.items():
-            for i, g in self.row[j].items():
-                active[i] = add(active[i], mul(algebra.constant(g), value))
-        return active
+    def configuration(self, q: Mapping[int, float]) -> dict[int, float]:
+        """All moving joints of one solution."""
+        return {j: float(x) for j, x in self.all({i: np.asarray(x) for i, x in q.items()}).items()}
+
+    def closest(self, loop: Loop) -> float:
+        """Smallest residual of one loop over many descents."""
+        rng = np.random.default_rng(4)
+        best = np.inf
+        for _ in range(8):
+            q = {j: float(rng.uniform(-np.pi, np.pi)) for j in self.free}
+            for _ in range(STEPS):
+                step = np.linalg.lstsq(self.jacobian(q), -self.residual({j: np.array([x]) for j, x in q.items()})[:, 0], rcond=1e-6)[0]
+                q = {j: x + float(np.clip(dx, -0.5, 0.5)) for (j, x), dx in zip(q.items(), step, strict=True)}
+            best = min(best, float(np.abs(self.residual({j: np.array([x]) for j, x in q.items()}, loop)).max()))
+        return best
+
+    def residual(self, q: Mapping[int, Array], loop: Loop | None = None) -> Array:
+        """Difference of cut and twin frames, positions in units of the longest link, shape (equations, samples)."""
+        pose = frame_poses(Geometry(self.robot, FloatAlgebra(self.robot, self.all(q)), open_tree(self.robot)))
+        shape = np.shape(next(iter(q.values())))
+        rows = []
+        for loop_k in self.robot.loops if loop is None else (loop,):
+            (A, P), (B, Q) = pose[loop_k.cut], pose[loop_k.twin]
+            rows += [(P[k] - Q[k]) / self.length for k in range(3)]
+            rows += [A[k][m] - B[k][m] for k in range(3) for m in range(3)]
+        return np.array([np.broadcast_to(np.asarray(x, dtype=float), shape) for x in rows])
+
+    def jacobian(self, q: Mapping[int, float]) -> Array:
+        """d residual / d free joints by central differences, shape (equations, free)."""
+        h = 1e-6
+        steps = np.concatenate([np.eye(len(self.free)), -np.eye(len(self.free))]) * h
+        at = {j: q[j] + steps[:, k] for k, j in enumerate(self.free)}
+        r = self.residual(at)
+        n = len(self.free)
+        return np.asarray((r[:, :n] - r[:, n:]) / (2 * h))
+
+    def solve(self, q: Mapping[int, float]) -> dict[int, float] | None:
+        """Newton for the unknown joints from `q`; None where it does not close."""
+        q = dict(q)
+        columns = [self.free.index(j) for j in self.unknown]
+        for _ in range(STEPS):
+            r = self.residual({j: np.array([x]) for j, x in q.items()})[:, 0]
+            if np.abs(r).max(initial=0.0) < TOLERANCE:
+                return q
+            step = np.linalg.lstsq(self.jacobian(q)[:, columns], -r, rcond=1e-9)[0]
+            scale = min(1.0, 0.5 / max(np.abs(step).max(initial=0.0), 1e-12))
+            for j, dx in zip(self.unknown, step, strict=True):
+                q[j] += scale * dx
+        r = self.residual({j: np.array([x]) for j, x in q.items()})
+        return q if np.abs(r).max(initial=0.0) < 10 * TOLERANCE else None
+
+    def rates(self, q: Mapping[int, float]) -> Array:
+        """G, shape (unknown, active): rates of the unknown joints."""
+        J = self.jacobian(q)
+        a, u = [self.free.index(j) for j in self.active], [self.free.index(j) for j in self.unknown]
+        return np.asarray(-np.linalg.lstsq(J[:, u], J[:, a], rcond=INDEPENDENT_MOTIONS)[0])
+
+    def mobility(self, q: Mapping[int, float]) -> tuple[int, int]:
+        """(freedoms of the mechanism, freedoms left with the actuators held)."""
+        J = self.jacobian(q)
+        u = [self.free.index(j) for j in self.unknown]
+        return len(self.free) - _rank(J), len(u) - _rank(J[:, u])
+
+
+def _rank(J: Array) -> int:
+    if J.size == 0:
+        return 0
+    s = np.linalg.svd(J, compute_uv=False)
+    return int(np.sum(s > INDEPENDENT_MOTIONS * max(float(s[0]), 1e-6)))
+
+
+def find_relations(robot: Robot) -> Found:
+    """Check the declared relations and find the linear ones of the remaining passive joints."""
+    relations = declared_relations(robot)
+    equations = LoopEquations(robot, relations)
+    in_loops = {j for loop in robot.loops for k in (loop.cut, loop.twin) for j in robot.path(k)}
+    for j in equations.unknown:
+        if j not in in_loops:
+            raise DescriptionError(
+                f"passive joint {j} has no relation: it is in no loop; declare q{j} under constraints or set mu: 1", path=("frames", j, "mu")
+            )
+    rng = np.random.default_rng(3)
+    solutions = 0
+    general: dict[int, float] | None = None
+    wanted = {j: x for loop in robot.loops for j, x in loop.start.items()}
+    for attempt in range(STARTS):
+        spread = 0.0 if attempt == 0 else np.pi
+        q0 = {j: wanted.get(j, 0.3 + 0.1 * j if attempt == 0 else float(rng.uniform(-spread, spread))) for j in equations.free}
+        q = equations.solve(q0) if robot.loops else q0
+        if q is None:
+            continue
+        solutions += 1
+        _check_mobility(robot, equations, q)
+        general = q if general is None else general
+        found = _linear(robot, equations, relations, q)
+        if found is not None:
+            return found
+        if wanted and attempt == 0:
+            break
+    if general is None:
+        raise _cannot_close(robot, equations)
+    row = {j: r for j, (r, _) in relations.items()}
+    return Found(row, {j: c for j, (_, c) in relations.items()}, equations.unknown, equations.configuration(general))
+
+
+def _check_mobility(robot: Robot, equations: LoopEquations, q: Mapping[int, float]) -> None:
+    freedoms, left = equations.mobility(q)
+    expected = len(robot.joints)
+    if freedoms != expected or left:
+        what = "over-constrained or has too many actuators" if freedoms < expected else "under-constrained or lacks actuators or relations"
+        raise DescriptionError(
+            f"mobility is {freedoms}, but {expected} joints are actuated ({list(robot.joints)})"
+            f"{f'; with them held, {left} freedoms are left' if left else ''}; the mechanism is {what}",
+            path=("loops",),
+        )
+
+
+def _linear(
+    robot: Robot, equations: LoopEquations, relations: Mapping[int, tuple[Mapping[int, Expression], Expression]], q: Mapping[int, float]
+) -> Found | None:
+    """The solution q as a linear closure, if it is one: whole constant rates, a recognised constant, proof over F_p."""
+    G = equations.rates(q)
+    N = np.round(G)
+    if G.size and np.abs(G - N).max() > 1e-5:
+        return None
+    moved = equations.solve({j: x + (0.37 + 0.1 * k if j in equations.active else 0.0) for k, (j, x) in enumerate(q.items())})
+    if moved is None or (G.size and np.abs(equations.rates(moved) - N).max() > 1e-5):
+        return None
+    row: dict[int, dict[int, Expression]] = {}
+    offset: dict[int, Expression] = {}
+    for k, j in enumerate(equations.unknown):
+        row[j] = {i: Expression.number(int(n)) for i, n in zip(equations.active, N[k], strict=True) if n}
+        c = q[j] - sum(float(n) * q[i] for i, n in zip(equations.active, N[k], strict=True))
+        recognised = _constant(robot, c) if robot.frame(j).sigma == REVOLUTE else _length(robot, c)
+        if recognised is None:
+            return None
+        offset[j] = recognised
+    for j, (r, c_j) in relations.items():
+        row[j], offset[j] = {}, c_j
+        for i, g in r.items():
+            for m, n in row[i].items() if i in equations.unknown else ((i, ONE),):
+                row[j][m] = row[j].get(m, ZERO) + g * n
+            if i in equations.unknown:
+                offset[j] = offset[j] + g * offset[i]
+    found = Found(row, offset, (), equations.configuration(q))
+    return found if _coincide(robot, found) else None
+
+
+def _constant(robot: Robot, c: float) -> Expression | None:
+    """An angle as a multiple of pi/2 plus fixed angles of the robot."""
+    angles = fixed_angles(robot)[:4]
+    values = [e.value(robot.constants) for e in angles]
+    for signs in sorted(product((0, 1, -1), repeat=len(angles)), key=lambda s: sum(map(abs, s))):
+        rest = c - sum(s * v for s, v in zip(signs, values, strict=True))
+        quarters = round(rest / (np.pi / 2))
+        if abs(rest - quarters * np.pi / 2) < 1e-7:
+            quarters = (quarters + 1) % 4 - 1  # -pi/2, 0, pi/2, pi
+            total = PI * Fraction(quarters, 2)
+            for s, e in zip(signs, angles, strict=True):
+                total = total + e * s
+            return total
+    return None
+
+
+def _length(robot: Robot, c: float) -> Expression | None:
+    """A length as a sum or difference of at most two lengths of the robot."""
+    lengths = [ZERO, *dict.fromkeys(e for f in robot.frames for e in (f.b, f.d, f.r0) if e)]
+    for e, f in product(lengths, repeat=2):
+        for s, t in product((1, -1), repeat=2):
+            if abs((e * s + f * t).value(robot.constants) - c) < 1e-9:
+                return e * s + f * t
+    return None
+
+
+def _coincide(robot: Robot, found: Found) -> bool:
+    """Whether cut and twin frames are equal over F_p for random lengths and positions: the proof of the relations."""
+    row = {j: {j: ONE} for j in robot.joints} | dict(found.row)
+    offset = dict.fromkeys(robot.joints, ZERO) | dict(found.offset)
+    draw = Draw(robot, 17, 3)
+    pose = frame_poses(Geometry(robot, draw, Closure(robot, row, offset)))
+
+    def equal(a: object, b: object) -> bool:
+        x, y = (v.x if isinstance(v, Fp) else np.array([int(v) % draw.p]) for v in (a, b))  # type: ignore[call-overload]
+        return bool(((x - y) % draw.p == 0).all())
+
+    for loop in robot.loops:
+        (A, P), (B, Q) = pose[loop.cut], pose[loop.twin]
+        entries = [*zip(P, Q, strict=True), *((A[k][m], B[k][m]) for k in range(3) for m in range(3))]
+        if not all(equal(a, b) for a, b in entries):
+            return False
+    return True
+
+
+def _cannot_close(robot: Robot, equations: LoopEquations) -> DescriptionError:
+    """Why no configuration closes: the declared relations, or the frames themselves."""
+    loop, gap = max(((loop, equations.closest(loop)) for loop in robot.loops), key=lambda found: found[1])
+    where = f"frame {loop.cut} (cut) and frame {loop.twin} (twin) cannot coincide; they come as close as {gap:.3g} (positions per longest link)"
+    in_loops = {j for loop in robot.loops for k in (loop.cut, loop.twin) for j in robot.path(k)}
+    declared = {j: e for j, e in robot.constraints.items() if j in in_loops}
+    if declared:
+        kept = {j: e for j, e in robot.constraints.items() if j not in declared}
+        try:
+            found = find_relations(replace(robot, constraints=kept))
+        except DescriptionError:
+            return DescriptionError(f"{where}, with or without the declared relations", path=("loops", robot.loops.index(loop)))
+        sides = [f"q{j}: declared {e}, the closure gives {_text(found, j)}" for j, e in declared.items() if j in found.row]
+        return DescriptionError(f"declared relations contradict the closure; {'; '.join(sides)}; {where}", path=("constraints", f"q{min(declared)}"))
+    return DescriptionError(f"{where}; check the lengths, alpha, theta and the row of the twin", path=("loops", robot.loops.index(loop)))
+
+
+def _text(found: Found, j: int) -> str:
+    """q_j as a relation, in the grammar of the robot file."""
+    total = found.offset[j]
+    for i, g in found.row[j].items():
+        total = total + g * Expression.symbol(f"q{i}")
+    return str(total)
+
+
+@lru_cache(maxsize=64)
+def close(robot: Robot) -> Closure:
+    """The closure of `robot`: declared relations checked, the others found. Raises DescriptionError where the loops cannot close."""
+    if not robot.passive:
+        return open_tree(robot)
+    found = find_relations(robot)
+    free = (*robot.joints, *found.tied)
+    return Closure(robot, {j: {j: ONE} for j in free} | dict(found.row), dict.fromkeys(free, ZERO) | dict(found.offset), found.tied, found.start)

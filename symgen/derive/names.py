@@ -17,6 +17,7 @@ FAMILIES = {
     "r": "position of a prismatic joint with its constant, m",
     "QP": "joint velocity",
     "QDP": "joint acceleration",
+    "G": "rate of a passive joint per unit rate of an actuated one",
     "W": "angular velocity of a link, in its frame",
     "WP": "angular acceleration of a link, in its frame",
     "DV": "products of angular velocity components W_k W_l",

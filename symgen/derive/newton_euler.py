@@ -53,13 +53,20 @@ class Motion:
         self.named = Names(len(self.robot.frames))
         self.gravity = gravity and unit is None
         self.tag: tuple[int, ...] = () if unit is None else (unit,)
-        joints = self.robot.joints
-        self._qd = {i: self.algebra.qd(i) if velocity and unit is None else 0 for i in joints}
-        self._qdd = {i: int(i == unit) if unit is not None else self.algebra.qdd(i) if acceleration else 0 for i in joints}
+        closure = geometry.closure
+        self._qd = {i: self.algebra.qd(i) if velocity and unit is None else 0 for i in closure.independent}
+        self._qdd = {i: self._acceleration(i, acceleration, velocity, unit) for i in closure.independent}
         g = tuple(self.algebra.constant(-e) for e in self.robot.gravity) if self.gravity else ZERO3
         self.link: dict[int, LinkMotion] = {0: LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, g)}
         for f in self.robot.frames:
             self.link[f.j] = self._link(f.j)
+
+    def _acceleration(self, i: int, acceleration: bool, velocity: bool, unit: int | None) -> Scalar:
+        """qdd_i of an independent joint; a tied one accelerates with the others, and from velocities alone."""
+        tied = i in self.geometry.closure.tied
+        if unit is not None:
+            return self.algebra.rate(i, unit) if tied else int(i == unit)
+        return self.algebra.qdd(i) if acceleration or (tied and velocity) else 0
 
     def q(self, j: int) -> Scalar:
         """Position of any moving joint; 0 where gravity, and so every force at rest, is left out."""

@@ -44,6 +44,10 @@ class Algebra(Protocol):
         """Acceleration of joint j."""
         ...
 
+    def rate(self, u: int, i: int) -> Scalar:
+        """dq_u/dq_i of a passive joint u that only the loop equations tie to the actuated joint i."""
+        ...
+
     def sign(self, rate: Scalar, row: tuple[tuple[int, Expression], ...]) -> Scalar:
         """sign(sd), sd = G qd = `rate`, G = `row`."""
         ...

@@ -137,7 +137,7 @@ class Robot:
         _check(self)
 
     def __hash__(self) -> int:
-        return hash((self.name, self.frames, self.gravity, self.elements))
+        return hash((self.name, self.frames, self.gravity, self.sha256))
 
     def frame(self, j: int) -> Frame:
         return self._by_number[j]

@@ -8,6 +8,7 @@ from textwrap import wrap
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from symgen.derive.loops import close
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.header import header, literal, packed, tables
 from symgen.emit.printers import Section
@@ -97,9 +98,7 @@ def _code(text: str) -> str:
 
 def _paths(robot: Robot) -> list[str]:
     """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the actuated ones move them."""
-    from symgen.derive.loops import Closure
-
-    closure = Closure(robot)
+    closure = close(robot)
     column = {j: k for k, j in enumerate(robot.joints)}
     paths = {}
     for f in robot.frames:

@@ -12,6 +12,7 @@ from textwrap import wrap
 from symgen.derive.columns import columns, element_names, inertial_names
 from symgen.derive.elements import element_column
 from symgen.derive.geometry import Geometry
+from symgen.derive.loops import close
 from symgen.derive.graph import Scalar
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.kinematics import frame_poses
@@ -81,7 +82,7 @@ def regressor_program(regrouping: Regrouping, own: Sequence[str]) -> tuple[list[
     """The entries (k, row) that may differ from zero, and the program that computes them, for the columns `own`."""
     robot = regrouping.robot
     algebra = GraphAlgebra(robot)
-    D = columns(Motion(Geometry(robot, algebra)), own)
+    D = columns(Motion(Geometry(robot, algebra, close(robot))), own)
     rows = {j: row for row, j in enumerate(robot.joints)}
     entries = [(k, rows[j]) for k, name in enumerate(own) for j in sorted(D[name]) if j in rows]
     return entries, Program(algebra, [D[own[k]][robot.joints[row]] for k, row in entries])
@@ -169,7 +170,7 @@ def _torques(
     robot = regrouping.robot
     algebra = GraphAlgebra(robot)
     base = _Base(regrouping, algebra, only)
-    motion = Motion(Geometry(robot, algebra), acceleration=acceleration, velocity=velocity)
+    motion = Motion(Geometry(robot, algebra, close(robot)), acceleration=acceleration, velocity=velocity)
     torque = base.torques(motion, friction=velocity)
     outputs = [torque[j] for j in robot.joints]
     text = Text(outputs, algebra.sections, (*LOCALS, *robot.constants))
@@ -180,7 +181,7 @@ def _torques(
 def _inertia_matrix(regrouping: Regrouping) -> Function:
     robot = regrouping.robot
     algebra = GraphAlgebra(robot)
-    base, geometry = _Base(regrouping, algebra), Geometry(robot, algebra)
+    base, geometry = _Base(regrouping, algebra), Geometry(robot, algebra, close(robot))
     entries: dict[tuple[int, int], Scalar | int] = {}
     for i in robot.joints:
         torque = base.torques(Motion(geometry, unit=i))
@@ -196,7 +197,7 @@ def _inertia_matrix(regrouping: Regrouping) -> Function:
 
 def _frame_poses(robot: Robot) -> Function:
     algebra = GraphAlgebra(robot)
-    pose = frame_poses(Geometry(robot, algebra))
+    pose = frame_poses(Geometry(robot, algebra, close(robot)))
     entries: list[tuple[str, Scalar | int]] = []
     for row, f in enumerate(robot.frames):
         A, P = pose[f.j]

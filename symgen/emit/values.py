@@ -12,7 +12,7 @@ import numpy as np
 
 from symgen.derive.graph import CONST, COS, INV, POS, SIGN, SIN, SQRT, Graph, Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.regroup.finite_field import Array, Draw, Fp, power
+from symgen.derive.exact import Array, Draw, Fp, power
 
 SAMPLES = 3
 

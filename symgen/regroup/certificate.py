@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symgen.regroup.finite_field import Array, Draw, Fp, angle_denominators, primes_for, rref
+from symgen.derive.exact import Array, Draw, Fp, angle_denominators, primes_for
+from symgen.regroup.finite_field import rref
 from symgen.regroup.regrouping import Regrouping
 from symgen.regroup.solve import sample, states_for
 

@@ -18,11 +18,13 @@ import numpy as np
 
 from symgen.derive.columns import columns
 from symgen.derive.geometry import Geometry
+from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion
 from symgen.description.expression import ONE, Expression, Monomial, call
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
-from symgen.regroup.finite_field import PI, Array, Draw, Fp, angle_denominators, fixed_angles, rref, small_rational
+from symgen.derive.exact import PI, Array, Draw, Fp, angle_denominators, fixed_angles
+from symgen.regroup.finite_field import rref, small_rational
 
 MAX_UNKNOWNS = 900
 DEGREES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (3, 0), (3, 2), (3, 3), (4, 0), (4, 4), (6, 0), (6, 6))
@@ -33,7 +35,7 @@ Variable = str | Monomial  # a constant's name, or the unit of a fixed angle
 def sample(draw: Draw, names: tuple[str, ...]) -> Array:
     """The regressor columns `names` at the draw's states, shape (..., n_active * samples, len(names)), int64 residues."""
     robot = draw.robot
-    D = columns(Motion(Geometry(robot, draw)), names)
+    D = columns(Motion(Geometry(robot, draw, close(robot))), names)
     W = np.zeros((len(names), len(robot.joints), *draw.shape), dtype=np.int64)
     for k, name in enumerate(names):
         for row, j in enumerate(robot.joints):

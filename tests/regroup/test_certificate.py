@@ -13,7 +13,7 @@ from symgen.derive.lagrange import numeric_regressor
 from symgen.description import Robot, load_robot, packaged_robots
 from symgen.description.expression import Expression
 from symgen.regroup.certificate import certify, numeric_rank
-from symgen.regroup.finite_field import Draw
+from symgen.derive.exact import Draw
 from symgen.regroup.regrouping import BaseParameter, Regrouping, regroup
 from symgen.regroup.solve import sample
 

@@ -1,0 +1,92 @@
+"""Closing the loops: which joints are functions of which.
+
+The moving joints of the tree are written as linear functions of the *independent* ones,
+
+    q_j = sum_i n_ji q_i + c_j ,     qd_j = sum_i n_ji qd_i ,     qdd_j = sum_i n_ji qdd_i        (n_ji, c_j constant)
+
+Serial robots and trees: every joint is independent. Parallelograms: the actuated joints are, and G = (n_ji). General loops: the passive
+joints that no linear relation gives are independent too, and tied to the actuated ones by the closure equations, qd_u = G_u qd_a. Then
+
+    Gamma_a = G' Gamma_tree
+
+Khalil and Dombre 2002, chapter 7 and section 10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from symgen.derive.scalar import Algebra, Scalar, Turn, add, mul
+from symgen.description.expression import ONE, ZERO, Expression
+from symgen.description.robot import Robot
+from symgen.errors import DescriptionError
+
+ActiveRow = tuple[tuple[int, Expression], ...]
+
+
+@dataclass(frozen=True)
+class Closure:
+    """`row[j]`, `offset[j]`: moving joint j in the independent joints; `tied`: independent passive joints (general loops)."""
+
+    robot: Robot
+    row: Mapping[int, Mapping[int, Expression]]
+    offset: Mapping[int, Expression]
+    tied: tuple[int, ...] = ()
+    start: Mapping[int, float] = field(default_factory=dict)
+    """A configuration of all moving joints that closes the loops; it picks the assembly mode of a general loop."""
+
+    @property
+    def independent(self) -> tuple[int, ...]:
+        return (*self.robot.joints, *self.tied)
+
+    @property
+    def is_trivial(self) -> bool:
+        return not self.robot.passive
+
+    def turn(self, j: int) -> tuple[Turn, Expression]:
+        """The angle of revolute joint j as whole multiples of independent angles plus a constant."""
+        turn = []
+        for i, g in sorted(self.row[j].items()):
+            c = g.constant
+            if c is None or c.denominator != 1:
+                raise DescriptionError(
+                    f"q{j} turns {g} times with q{i}; a passive angle needs whole multiples of other angles", path=("constraints", f"q{j}")
+                )
+            turn.append((i, int(c)))
+        return tuple(turn), self.offset[j]
+
+    def linear(self, algebra: Algebra, j: int, value: Mapping[int, Scalar]) -> Scalar:
+        """sum_i n_ji value_i."""
+        total: Scalar = 0
+        for i, g in self.row[j].items():
+            total = add(total, mul(algebra.constant(g), value[i]))
+        return total
+
+    def in_independent(self, row: Mapping[int, Expression]) -> ActiveRow:
+        """The row of s = row q in the independent joints."""
+        total: dict[int, Expression] = {}
+        for j, g in row.items():
+            for i, h in self.row[j].items():
+                total[i] = total.get(i, ZERO) + g * h
+        return tuple(sorted(((i, g) for i, g in total.items() if g), key=lambda ig: ig[0]))
+
+    def project(self, algebra: Algebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
+        """G' Gamma_tree, by actuated joint."""
+        if self.is_trivial:
+            return dict(torque)
+        total: dict[int, Scalar] = dict.fromkeys(self.independent, 0)
+        for j, value in torque.items():
+            for i, g in self.row[j].items():
+                total[i] = add(total[i], mul(algebra.constant(g), value))
+        for i in self.robot.joints:
+            for u in self.tied:
+                total[i] = add(total[i], mul(algebra.rate(u, i), total[u]))
+        return {i: total[i] for i in self.robot.joints}
+
+
+def open_tree(robot: Robot) -> Closure:
+    """Every moving joint on its own, loops cut."""
+    moving = robot.moving
+    passive = tuple(j for j in moving if j not in robot.joints)
+    return Closure(robot, {j: {j: ONE} for j in moving}, dict.fromkeys(moving, ZERO), passive)

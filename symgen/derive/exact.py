@@ -1,0 +1,307 @@
+"""Robots over the prime field F_p: an algebra in which random states and geometries are exact.
+
+p < 2**31, so products fit in int64. p = 3 (mod 4): 1 + t**2 is never 0 and every angle is a point ((1 - t**2)/(1 + t**2), 2t/(1 + t**2)) of
+the unit circle. The points form a group of order p + 1; p is chosen so that this order is a multiple of 2D, D the common
+denominator of the robot's angles in units of pi: pi/3 or pi/4 are then exact roots of unity of F_p, not approximations.
+A fixed angle that is no multiple of pi is transcendental, hence a random point; its rational multiples are powers of that point.
+
+Directions of motion: sign(sd) = 2b - 1 with a random field value b for each class of proportional rows G; max(sd, 0) = b sd. Everything is
+linear in b, so a generic b proves what bits would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from functools import lru_cache
+from math import lcm
+
+import numpy as np
+
+from symgen.derive.scalar import Scalar, Turn
+from symgen.description.expression import Call, Expression, Monomial, call, quarter_turns
+from symgen.description.robot import Robot
+
+Array = np.ndarray
+PI: Monomial = (("pi", 1),)
+
+
+class Fp:
+    """Elements of F_p, an int64 array of any shape."""
+
+    __array_ufunc__ = None
+    __slots__ = ("p", "x")
+
+    def __init__(self, x: Array, p: int) -> None:
+        self.x, self.p = x, p
+
+    def _lift(self, other: Fp | int) -> Array | int:
+        return other.x if isinstance(other, Fp) else other % self.p
+
+    def __add__(self, other: Fp | int) -> Fp:
+        return Fp((self.x + self._lift(other)) % self.p, self.p)
+
+    def __sub__(self, other: Fp | int) -> Fp:
+        return Fp((self.x - self._lift(other)) % self.p, self.p)
+
+    def __rsub__(self, other: int) -> Fp:
+        return Fp((other - self.x) % self.p, self.p)
+
+    def __mul__(self, other: Fp | int) -> Fp:
+        return Fp(self.x * self._lift(other) % self.p, self.p)
+
+    def __neg__(self) -> Fp:
+        return Fp(-self.x % self.p, self.p)
+
+    def __truediv__(self, other: Fp) -> Fp:
+        return self * Fp(power(other.x, self.p - 2, self.p), self.p)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+def power(x: Array, n: int, p: int) -> Array:
+    """x**n mod p, elementwise."""
+    result = np.ones_like(x)
+    while n:
+        if n & 1:
+            result = result * x % p
+        x = x * x % p
+        n >>= 1
+    return result
+
+
+def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
+    """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and the leading sign positive."""
+    found: dict[Expression, None] = {}
+    for e in _angles(robot):
+        rest = quarter_turns(e)[1]
+        if rest and -rest not in found:
+            found[rest] = None
+    return tuple(found)
+
+
+def angle_denominators(robot: Robot) -> dict[Monomial, int]:
+    """{monomial: D}: every fixed angle is a sum of whole multiples of monomial/D."""
+    D: dict[Monomial, int] = {PI: 2}
+    for e in fixed_angles(robot):
+        for m, c in e.terms.items():
+            D[m] = lcm(D.get(m, 1), c.denominator)
+    return D
+
+
+def _angles(robot: Robot) -> Iterator[Expression]:
+    for f in robot.frames:
+        yield from (f.gamma, f.alpha, f.theta0)
+    joints = {f"q{i}": Expression() for i in robot.moving}
+    for e in robot.constraints.values():
+        yield e.substitute(joints)
+    lengths = [e for f in robot.frames for e in (f.b, f.d, f.r0)]
+    rows = [c for e in robot.elements for table in (e.along, e.form) for row in table.values() for c in row.values()]
+    for e in (*robot.gravity, *lengths, *rows):
+        yield from (a.argument for a in e.atoms if isinstance(a, Call) and a.function in ("cos", "sin"))
+
+
+@lru_cache
+def primes_for(denominator: int, count: int) -> tuple[int, ...]:
+    """The largest `count` primes p < 2**31 with 4 and 2 `denominator` dividing p + 1."""
+    step = lcm(4, 2 * denominator)
+    p = (2**31) // step * step - 1
+    found: list[int] = []
+    while len(found) < count:
+        if _is_prime(p):
+            found.append(p)
+        p -= step
+    return tuple(found)
+
+
+def _is_prime(n: int) -> bool:
+    """Miller-Rabin with bases 2, 3, 5, 7: exact below 3.2e9."""
+    if n < 2 or any(n % b == 0 for b in (2, 3, 5, 7) if n != b):
+        return False
+    d, s = n - 1, 0
+    while d % 2 == 0:
+        d, s = d // 2, s + 1
+    for base in (2, 3, 5, 7):
+        x = pow(base, d, n)
+        if x in (1, n - 1):
+            continue
+        for _ in range(s - 1):
+            x = x * x % n
+            if x == n - 1:
+                break
+        else:
+            return False
+    return True
+
+
+Point = tuple[Array, Array]  # (cos, sin) over F_p
+
+
+class Draw:
+    """One random robot and `samples` random states over F_p: an Algebra of the derivation.
+
+    `geometry` gives residues, shape (count, 1), for constants by name and for half-angle tangents of fixed angles by their unit: `count`
+    robots in the same states. Without it everything is random and redrawn until every square root exists.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        seed: int,
+        samples: int,
+        *,
+        p: int | None = None,
+        geometry: Mapping[str | Monomial, Array] | None = None,
+        count: int = 0,
+    ) -> None:
+        self.robot, self.samples = robot, samples
+        self.shape = (count, samples) if geometry is not None else (samples,)
+        self._geometry = geometry or {}
+        self.denominators = angle_denominators(robot)
+        self.p = p if p is not None else primes_for(self.denominators[PI], 1)[0]
+        self.rng = np.random.default_rng(seed)
+        for _ in range(200):
+            self._constants = {name: self._geometry[name] if name in self._geometry else self._random(1) for name in robot.constants}
+            self._angles: dict[Monomial, Point] = {}
+            if self._roots_exist():
+                break
+        self._directions: dict[tuple[tuple[int, Expression], ...], Array] = {}
+        self._q = {j: self._random(samples) for j in robot.joints}
+        self._qd = {j: self._random(samples) for j in robot.joints}
+        self._qdd = {j: self._random(samples) for j in robot.joints}
+        self._point = {j: self._circle(samples) for j in robot.joints}
+
+    def _random(self, size: int) -> Array:
+        return self.rng.integers(1, self.p, size)
+
+    def _fp(self, x: Array) -> Fp:
+        return Fp(x, self.p)
+
+    def _circle(self, size: int) -> Point:
+        return self._point_at(self._random(size))
+
+    def _point_at(self, t: Array) -> Point:
+        inverse = power((1 + t * t) % self.p, self.p - 2, self.p)
+        return (1 - t * t) % self.p * inverse % self.p, 2 * t % self.p * inverse % self.p
+
+    def _turned(self, a: Point, b: Point) -> Point:
+        p = self.p
+        return (a[0] * b[0] - a[1] * b[1] % p) % p, (a[0] * b[1] + a[1] * b[0] % p) % p
+
+    def _multiple(self, a: Point, n: int) -> Point:
+        """The point of the angle n a."""
+        if n < 0:
+            a, n = (a[0], -a[1] % self.p), -n
+        result: Point = (np.ones_like(a[0]), np.zeros_like(a[0]))
+        while n:
+            if n & 1:
+                result = self._turned(result, a)
+            a = self._turned(a, a)
+            n >>= 1
+        return result
+
+    def _unit(self, m: Monomial) -> Point:
+        """The point of the angle monomial/D; for pi a root of unity of order 2D."""
+        if m not in self._angles:
+            if m in self._geometry:
+                self._angles[m] = self._point_at(self._geometry[m])
+            else:
+                self._angles[m] = self._root_of_unity(2 * self.denominators[m]) if m == PI else self._circle(1)
+        return self._angles[m]
+
+    def _root_of_unity(self, order: int) -> Point:
+        """A point of that order, a multiple of 4, a quarter of which is (0, 1)."""
+        while True:
+            root = self._multiple(self._circle(1), (self.p + 1) // order)
+            primitive = all(self._multiple(root, order // k)[0][0] != 1 for k in range(2, order + 1) if order % k == 0)
+            if primitive and self._multiple(root, order // 4)[1][0] == 1:
+                return root
+
+    def _angle(self, e: Expression) -> Point:
+        """(cos, sin) of a constant angle."""
+        turns, rest = quarter_turns(e)
+        quarter = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns % 4]
+        point: Point = (np.array([quarter[0] % self.p]), np.array([quarter[1] % self.p]))
+        for m, c in rest.terms.items():
+            point = self._turned(point, self._multiple(self._unit(m), int(c * self.denominators[m])))
+        return point
+
+    def _roots_exist(self) -> bool:
+        try:
+            for f in self.robot.frames:
+                for e in (f.b, f.d, f.r0):
+                    self.constant(e)
+        except ArithmeticError:
+            return False
+        return True
+
+    # --- Algebra ---
+
+    def constant(self, e: Expression) -> Scalar:
+        c = e.constant
+        if c is not None and c in (0, 1, -1):
+            return int(c)
+        return e.evaluate(lambda name: self._fp(self._constants[name]), self._call, self._number)
+
+    def _number(self, c: Fraction) -> Fp:
+        return self._fp(np.array([c.numerator * pow(c.denominator, -1, self.p) % self.p]))
+
+    def _call(self, function: str, argument: Expression) -> Fp:
+        if function in ("cos", "sin"):
+            return self._fp(self._angle(argument)[function == "sin"])
+        x = self.constant(argument)
+        value = x if isinstance(x, Fp) else self._number(Fraction(x))
+        if function == "inv":
+            return self._fp(power(value.x, self.p - 2, self.p))
+        root = power(value.x, (self.p + 1) // 4, self.p)
+        if (root * root % self.p != value.x).any():
+            raise ArithmeticError("no square root in this draw")
+        return self._fp(root)
+
+    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
+        if not turn:
+            c, s = (self.constant(call(name, offset)) for name in ("cos", "sin"))
+            return c, s
+        point = self._angle(offset)
+        for j, n in turn:
+            point = self._turned(point, self._multiple(self._point[j], n))
+        return self._fp(point[0]), self._fp(point[1])
+
+    def q(self, j: int) -> Fp:
+        return self._fp(self._q[j])
+
+    def qd(self, j: int) -> Fp:
+        return self._fp(self._qd[j])
+
+    def qdd(self, j: int) -> Fp:
+        return self._fp(self._qdd[j])
+
+    def _forward(self, row: tuple[tuple[int, Expression], ...]) -> tuple[Fp, int]:
+        """b of the direction class of a row, and whether the row runs along (1) or against (-1) it."""
+        lead = row[0][1].constant
+        orientation = 1
+        if lead is not None:
+            row = tuple((i, g * (1 / lead)) for i, g in row)
+            orientation = 1 if lead > 0 else -1
+        if row not in self._directions:
+            self._directions[row] = self._random(self.samples)
+        b = self._fp(self._directions[row])
+        return b, orientation
+
+    def sign(self, rate: Scalar, row: tuple[tuple[int, Expression], ...]) -> Fp:
+        b, orientation = self._forward(row)
+        return (b + b - 1) * orientation
+
+    def one_sided(self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str) -> tuple[Scalar, Scalar]:
+        b, orientation = self._forward(row)
+        if orientation < 0:
+            b = 1 - b
+        return (b, b * rate) if when == "positive" else (b - 1, (1 - b) * rate)
+
+    def name(self, value: Scalar, name: str) -> Scalar:
+        return value
+
+    hint = name
+
+    def section(self, title: str) -> None:
+        pass
