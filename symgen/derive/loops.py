@@ -85,7 +85,8 @@ class LoopEquations:
         for _ in range(8):
             q = {j: float(rng.uniform(-np.pi, np.pi)) for j in self.free}
             for _ in range(STEPS):
-                step = np.linalg.lstsq(self.jacobian(q), -self.residual({j: np.array([x]) for j, x in q.items()})[:, 0], rcond=1e-6)[0]
+                r, J = self.linearised(q)
+                step = np.linalg.lstsq(J, -r, rcond=1e-6)[0]
                 q = {j: x + float(np.clip(dx, -0.5, 0.5)) for (j, x), dx in zip(q.items(), step, strict=True)}
             best = min(best, float(np.abs(self.residual({j: np.array([x]) for j, x in q.items()}, loop)).max()))
         return best
@@ -101,24 +102,25 @@ class LoopEquations:
             rows += [A[k][m] - B[k][m] for k in range(3) for m in range(3)]
         return np.array([np.broadcast_to(np.asarray(x, dtype=float), shape) for x in rows])
 
+    def linearised(self, q: Mapping[int, float]) -> tuple[Array, Array]:
+        """residual (equations,) and, by central differences, d residual / d free joints (equations, free)."""
+        n, h = len(self.free), 1e-6
+        steps = np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)]) * h
+        r = self.residual({j: q[j] + steps[:, k] for k, j in enumerate(self.free)})
+        return r[:, 0], (r[:, 1 : n + 1] - r[:, n + 1 :]) / (2 * h)
+
     def jacobian(self, q: Mapping[int, float]) -> Array:
-        """d residual / d free joints by central differences, shape (equations, free)."""
-        h = 1e-6
-        steps = np.concatenate([np.eye(len(self.free)), -np.eye(len(self.free))]) * h
-        at = {j: q[j] + steps[:, k] for k, j in enumerate(self.free)}
-        r = self.residual(at)
-        n = len(self.free)
-        return np.asarray((r[:, :n] - r[:, n:]) / (2 * h))
+        return self.linearised(q)[1]
 
     def solve(self, q: Mapping[int, float]) -> dict[int, float] | None:
         """Newton for the unknown joints from `q`; None where it does not close."""
         q = dict(q)
         columns = [self.free.index(j) for j in self.unknown]
         for _ in range(STEPS):
-            r = self.residual({j: np.array([x]) for j, x in q.items()})[:, 0]
+            r, J = self.linearised(q)
             if np.abs(r).max(initial=0.0) < TOLERANCE:
                 return q
-            step = np.linalg.lstsq(self.jacobian(q)[:, columns], -r, rcond=1e-9)[0]
+            step = np.linalg.lstsq(J[:, columns], -r, rcond=1e-9)[0]
             scale = min(1.0, 0.5 / max(np.abs(step).max(initial=0.0), 1e-12))
             for j, dx in zip(self.unknown, step, strict=True):
                 q[j] += scale * dx

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 Monomial = tuple[tuple["str | Call", int], ...]
@@ -253,6 +253,7 @@ def _atom(function: str, argument: Expression) -> Expression:
     return Expression({((Call(function, argument), 1),): Fraction(1)})
 
 
+@lru_cache(maxsize=4096)
 def call(function: str, argument: Expression) -> Expression:
     """cos, sin, tan, sqrt or inv of an expression; quarter turns, signs and perfect squares are taken out exactly."""
     if function == "tan":

@@ -7,7 +7,7 @@ from math import gcd
 
 import numpy as np
 
-from symgen.derive.exact import Array
+from symgen.derive.exact import Array, power
 
 
 def rref(M: Array, p: int) -> tuple[list[int], Array]:
@@ -33,6 +33,27 @@ def rref(M: Array, p: int) -> tuple[list[int], Array]:
         if rank == rows:
             break
     return pivots, M[:rank]
+
+
+def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
+    """beta with W[g, :, -1] = W[g, :, :-1] beta[g] for every g at once, shape (G, columns - 1); None unless all are consistent.
+
+    Random combinations of the rows need no pivoting; three more than unknowns, which must come out zero.
+    """
+    count, rows, columns = W.shape
+    unknowns = columns - 1
+    mix = rng.integers(1, p, (unknowns + 3, rows))
+    M = np.zeros((count, unknowns + 3, columns), dtype=np.int64)
+    for r in range(rows):
+        M = (M + mix[None, :, r, None] * W[:, None, r, :]) % p
+    for c in range(unknowns):
+        if not M[:, c, c].all():
+            return None
+        M[:, c, c:] = M[:, c, c:] * power(M[:, c, c], p - 2, p)[:, None] % p
+        factor = M[:, :, c].copy()
+        factor[:, c] = 0
+        M[:, :, c:] = (M[:, :, c:] - factor[:, :, None] * M[:, c, None, c:]) % p
+    return None if M[:, unknowns:, unknowns].any() else M[:, :unknowns, unknowns]
 
 
 def small_rational(x: int, p: int, bound: int = 1000) -> Fraction | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 
 from symgen.derive.columns import element_names, inertial_names
 from symgen.description.expression import ONE, ZERO, Call, Expression
@@ -65,13 +66,14 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     base = tuple(names[c] for c in pivots)
     combination: dict[str, Combination] = {name: transfer.combination[name] for name in base}
     steps = list(transfer.steps)
-    for c in sorted(set(range(len(names))) - set(pivots)):
-        support = tuple(base[k] for k in range(len(base)) if R[k, c])
-        for target, beta in zip(support, coefficients(robot, names[c], support) if support else (), strict=True):
-            steps.append((names[c], target, beta))
+    dependent = [c for c in range(len(names)) if c not in pivots]
+    supports = {names[c]: tuple(base[k] for k in range(len(base)) if R[k, c]) for c in dependent}
+    for name, found in coefficients(robot, supports).items():
+        for target, beta in zip(supports[name], found, strict=True):
+            steps.append((name, target, beta))
             into = combination[target]
-            for name, value in transfer.combination[names[c]].items():
-                into[name] = into.get(name, ZERO) + beta * value
+            for standard, value in transfer.combination[name].items():
+                into[standard] = into.get(standard, ZERO) + beta * value
     return _assemble(robot, combination, steps, draw)
 
 
@@ -117,22 +119,17 @@ def _vanishes(c: Expression, draw: Draw) -> bool:
 
 
 def simplified(e: Expression) -> Expression:
-    """cos(a)**2 m + sin(a)**2 m = m wherever both are there with one coefficient."""
-    changed = True
-    while changed:
-        changed = False
-        for m, c in e.terms.items():
-            for a, n in m:
-                if isinstance(a, Call) and a.function == "cos" and n >= 2:
-                    rest = tuple((b, k - 2 if b == a else k) for b, k in m if b != a or k > 2)
-                    cosine, common = Expression({m: c}), Expression({rest: c})
-                    sine = common * Expression({((Call("sin", a.argument), 2),): ONE.terms[()]})
-                    ((partner, value),) = sine.terms.items()
-                    if e.terms.get(partner) == value:
-                        e, changed = e - cosine - sine + common, True
-                        break
-            if changed:
-                break
+    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there with one coefficient."""
+    for m, c in e.terms.items():
+        for a, n in m:
+            if isinstance(a, Call) and a.function == "cos" and n >= 2:
+                rest = tuple((b, k - 2 if b == a else k) for b, k in m if b != a or k > 2)
+                cosine, common = Expression({m: c}), Expression({rest: c})
+                sine = common * Expression({((Call("sin", a.argument), 2),): Fraction(1)})
+                for partner, shorter in ((sine, common), (-common, -sine)):
+                    ((key, value),) = partner.terms.items()
+                    if e.terms.get(key) == value:
+                        return simplified(e - cosine - partner + shorter)
     return e
 
 
