@@ -1,0 +1,167 @@
+"""The identification of one robot on its records, with everything a report says about it.
+
+    model, records, study -> Y = W X + rho -> all parameters, eqs. (7)-(11), and the essential ones
+                          -> measured beside predicted, halves of the record against each other, weak directions, drives without coupling
+
+Values only: files and figures are made by the caller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from runtime.drives import Coupling, Drives
+from runtime.essential import Essential, essential
+from runtime.estimate import Estimate
+from runtime.estimators import estimate
+from runtime.model import GeneratedModel
+from runtime.observation import Observation, observe, stack
+from runtime.record import Record
+from runtime.study import Study
+from runtime.validation import (
+    Comparison,
+    CrossValidation,
+    WeakDirections,
+    cross_validation,
+    direct_comparison,
+    split_validation,
+    weak_directions,
+)
+
+COUPLINGS: tuple[Coupling, ...] = ("both", "position", "torque", "none")
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Results on one robot.
+
+    found : all parameters, the essential ones and the trail between them.   comparison : torques by the essential parameters.
+    validation : one part of the data predicts the others: halves first, then further records.   weak : parameters that trade.
+    coupling : fit of all parameters with the off-diagonal part of the drives in both directions, one, or none; empty where there is none.
+    """
+
+    model: GeneratedModel
+    study: Study
+    records: tuple[Record, ...]
+    observation: Observation
+    found: Essential
+    comparison: Comparison
+    validation: tuple[CrossValidation, ...]
+    weak: WeakDirections
+    coupling: Mapping[Coupling, Estimate]
+
+    @property
+    def name(self) -> str:
+        """Names of the records."""
+        return ", ".join(record.name for record in self.records)
+
+    @property
+    def every(self) -> Estimate:
+        """The fit of all parameters."""
+        return self.found.all_parameters
+
+    @property
+    def predicted_error(self) -> float:
+        """Relative error in % of the essential parameters on the parts of the record that did not give them, the largest."""
+        errors = [p.relative_error for p in self.validation[0].predictions if not p.fitted and p.columns == "essential"]
+        return max(errors, default=float("nan"))
+
+    @property
+    def verdict(self) -> str:
+        """One sentence."""
+        if self.every.status == "rank-deficient":
+            names = "; ".join(", ".join(group) for group in self.every.groups)
+            return (
+                f"The record {self.name} does not determine {self.model.NAME}: rank {self.every.rank} for {len(self.every.names)} "
+                f"parameters, cannot be told apart: {names}."
+            )
+        worst = max(self.found.estimate.per_joint, key=lambda joint: joint.relative_error)
+        return (
+            f"{len(self.found.names)} of {len(self.every.names)} parameters carry the model of {self.model.NAME}: they explain the record "
+            f"{self.name} to {self.found.estimate.relative_error:.1f} % (joint {worst.joint} worst, {worst.relative_error:.1f} %) and predict its "
+            f"unseen half to {self.predicted_error:.1f} %."
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """What estimate.json holds beside the Estimate of all parameters."""
+        fit = self.found.estimate
+        return {
+            "essential": {
+                **self.found.summary(),
+                "X": fit.X,
+                "sigma": fit.sigma,
+                "relative_sigma": fit.relative_sigma,
+                "sigma_corrected": fit.sigma_corrected,
+                "relative_error": fit.relative_error,
+                "per_joint": fit.per_joint,
+            },
+            "validation": [part.summary() for part in self.validation],
+            "weak_directions": {"threshold": self.weak.threshold, "pairs": self.weak.pairs, "groups": self.weak.groups},
+            "coupling": {key: {"relative_error": e.relative_error, "per_joint": e.per_joint} for key, e in self.coupling.items()},
+            "verdict": self.verdict,
+        }
+
+
+def identification(
+    model: GeneratedModel,
+    study: Study,
+    records: Sequence[Record],
+    *,
+    further: Sequence[Record] = (),
+    provenance: Mapping[str, Any] | None = None,
+) -> Identification:
+    """Identify by the settings of `study`.
+
+    records : joint side, as read by study.record.   further : those of study.validate.record, predicted with the parameters found.
+    """
+    observation = stack([observe(model, record, study) for record in records])
+    found = essential(observation, study.essential, study.estimate, model=model, provenance=provenance)
+    windows = study.validate.split or halves(observation)
+    validation = [split_validation(observation, windows, study.estimate, essential=found.names)]
+    if further:
+        seen = {record.name: observe(model, record, study) for record in further}
+        name = ", ".join(record.name for record in records)
+        validation.append(cross_validation(observation, seen, study.estimate, essential=found.names, name=name))
+    return Identification(
+        model=model,
+        study=study,
+        records=tuple(records),
+        observation=observation,
+        found=found,
+        comparison=direct_comparison(observation, found.estimate),
+        validation=tuple(validation),
+        weak=weak_directions(observation, study.estimate),
+        coupling=coupling_fits(model, study, records),
+    )
+
+
+def halves(observation: Observation) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The two halves in time of the rows used, s."""
+    t0, t1 = float(observation.t.min()), float(observation.t.max())
+    middle = (t0 + t1) / 2
+    return (t0, middle), (float(np.nextafter(middle, t1)), t1)
+
+
+def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record]) -> dict[Coupling, Estimate]:
+    """Fits of all parameters with the coupling of the drives in position and torque, in one, or in none; motor-side records only."""
+    if model.DRIVES is None or any(settings.side != "motor" for settings in study.record) or len(records) != len(study.record):
+        return {}
+    drives = Drives.from_mapping(model.DRIVES)
+    if not (drives.ratio - np.diag(np.diag(drives.ratio))).any():
+        return {}
+    fits: dict[Coupling, Estimate] = {}
+    for coupling in COUPLINGS:
+        pairs = zip(records, study.record, strict=True)
+        changed = [recoupled(record, drives.decoupled(settings.coupling), drives.decoupled(coupling)) for record, settings in pairs]
+        fits[coupling] = estimate(stack([observe(model, record, study) for record in changed]), study.estimate, model=model)
+    return fits
+
+
+def recoupled(record: Record, used: Drives, wanted: Drives) -> Record:
+    """The record as the drives `wanted` would have turned its motor side into the joint side; `used` are those it was read with."""
+    q = wanted.joint_position(used.motor_position(record.q))
+    return replace(record, q=q, tau=wanted.joint_torque(used.motor_command(record.tau)))

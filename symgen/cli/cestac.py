@@ -1,0 +1,120 @@
+"""`symgen cestac ROBOT RECORD`: what would a coarser encoder (or torque sensor) have done to the estimate?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from symgen.cli.session import NEGATIVE, opened_model, reported_errors, single_thread, study_and_records, study_text
+from symgen.cli.writing import write_all
+
+if TYPE_CHECKING:
+    from runtime.cestac_result import Cestac, Run
+    from runtime.study import Study
+
+
+def cestac(
+    robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml) or generated module (.py).")],
+    record: Annotated[str, typer.Argument(help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side).")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for cestac.json, report.html, the figure and study.yaml.")
+    ] = None,
+    delta: Annotated[list[str] | None, typer.Option(help="Position step, rad or m, such as 2*pi/5000; repeat for several.")] = None,
+    torque: Annotated[list[str] | None, typer.Option(help="Motor torque step, N m or N; repeat for several.")] = None,
+    runs: Annotated[int | None, typer.Option(help="Runs per step, at least 2.")] = None,
+    rounding: Annotated[str | None, typer.Option(help="two-point, uniform, gaussian or quantise.")] = None,
+    side: Annotated[str | None, typer.Option(help="joint or motor: where positions are rounded.")] = None,
+    columns: Annotated[str | None, typer.Option(help="essential, all, or names separated by commas.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random rounding.")] = None,
+    workers: Annotated[int, typer.Option(min=0, help="Processes; 0: this one. The results do not depend on it.")] = 0,
+    json: Annotated[bool, typer.Option("--json", help="Print cestac.json instead of tables.")] = False,
+) -> None:
+    """Study the encoder resolution. Exit code 1 where least squares is biased at one of the steps."""
+    single_thread()
+    given = {"delta": delta, "torque": torque, "runs": runs, "rounding": rounding, "side": side, "seed": seed}
+    given["columns"] = columns.split(",") if columns and "," in columns else _one_name(columns)
+    with reported_errors(), opened_model(robot) as model:
+        import runtime.cestac as study_of_resolution
+
+        study, folder, records = study_and_records(record, model)
+        study = changed(study, {key: value for key, value in given.items() if value is not None})
+        with progress_bar() as progress:
+            provenance = {"records": [r.name for r in records]}
+            result = study_of_resolution.cestac(model, records, study, workers=workers, progress=progress, provenance=provenance)
+        if output is not None:
+            title = f"{model.NAME}: encoder resolution on {', '.join(r.name for r in records)}"
+            write_all(output, resolution_files(result, study_text(study, folder, output), title))
+        typer.echo(result.to_json() if json else console_text(result), nl=not json)
+        if output is not None:
+            typer.echo(f"report: {output / 'report.html'}", err=True)
+    if result.verdict == "biased":
+        raise typer.Exit(NEGATIVE)
+
+
+def changed(study: Study, given: dict[str, Any]) -> Study:
+    """The study with some of its cestac settings replaced, checked like those of a file."""
+    from runtime.study import study_from_mapping, to_mapping
+
+    mapping = to_mapping(study)
+    return study_from_mapping({**mapping, "cestac": {**mapping["cestac"], **given}})
+
+
+def progress_bar() -> Any:
+    """A bar on the error stream; the context gives what `cestac` calls after every run."""
+    from contextlib import contextmanager
+
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    @contextmanager
+    def bar() -> Any:
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+            task = progress.add_task("runs", total=None)
+
+            def advance(run: Run, done: int, total: int) -> None:
+                progress.update(task, completed=done, total=total)
+
+            yield advance
+
+    return bar()
+
+
+def console_text(result: Cestac) -> str:
+    """Means and residuals as Table 3, then %e (%sigma), then the verdict in one sentence."""
+    return f"{result.to_table()}\n\n%e (21) and, in brackets, %sigma (20); * does not decide\n{result.errors_table()}\n\n{verdict_sentence(result)}"
+
+
+def verdict_sentence(result: Cestac) -> str:
+    """What the study says, level by level, in one sentence."""
+    by_verdict: dict[str, list[str]] = {}
+    for level in result.levels:
+        by_verdict.setdefault(level.verdict, []).append(level.level.label)
+    meaning = {"unbiased": "practically unbiased", "doubtful": "doubtful", "biased": "biased"}
+    parts = [f"{meaning[verdict]} at {', '.join(labels)}" for verdict, labels in by_verdict.items()]
+    worst = max(result.levels, key=lambda level: max(level.decided_by.values(), default=0.0), default=None)
+    if worst is None:
+        return "Nothing was perturbed."
+    name, error = next(iter(worst.decided_by.items()))
+    return f"Least squares is {'; '.join(parts)}; largest change: {'the residual' if name == 'rho' else name}, {error:.1f} % at {worst.level.label}."
+
+
+def resolution_files(result: Cestac, study: str, title: str) -> dict[str, str | bytes]:
+    """Contents of the output folder, by file name."""
+    from runtime.report import plots
+    from runtime.report.html import Page, Section, render
+    from runtime.report.sections import resolution_section
+
+    settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
+    page = Page(title=title, verdict=verdict_sentence(result), sections=[resolution_section(result), settings])
+    files: dict[str, str | bytes] = {"report.html": render(page), "cestac.json": result.to_json(), "study.yaml": study}
+    if any(level.level.delta and not level.level.torque for level in result.levels):
+        figure = plots.error_against_resolution(result)
+        files |= {"resolution.png": plots.png(figure), "resolution.svg": plots.svg(figure)}
+    return files
+
+
+def _one_name(columns: str | None) -> str | list[str] | None:
+    return columns if columns in (None, "essential", "all") else [columns]

@@ -1,0 +1,98 @@
+"""`symgen identify ROBOT RECORD`: parameters of a robot from a record, with an honest statement of how far to trust them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from symgen.cli.session import NEGATIVE, opened_model, reported_errors, single_thread, study_and_records, study_text
+from symgen.cli.writing import write_all
+
+if TYPE_CHECKING:
+    from runtime.identification import Identification
+
+
+def identify(
+    robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml) or generated module (.py).")],
+    record: Annotated[str, typer.Argument(help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side).")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for report.html, estimate.json, figures, tables, study.yaml.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print estimate.json instead of tables.")] = False,
+) -> None:
+    """Identify the base parameters of ROBOT from RECORD. Exit code 1 where the record does not determine them."""
+    single_thread()
+    with reported_errors(), opened_model(robot) as model:
+        from runtime.identification import identification
+        from runtime.io.records import read_records
+
+        study, folder, records = study_and_records(record, model)
+        further = read_records(study.validate.record, model, folder=folder)
+        found = identification(model, study, records, further=further, provenance={"records": [r.name for r in records]})
+        if output is not None:
+            write_all(output, identification_files(found, study_text(study, folder, output)))
+        typer.echo(estimate_json(found) if json else console_text(found), nl=not json)
+        if output is not None:
+            typer.echo(f"report: {output / 'report.html'}", err=True)
+    if found.every.status == "rank-deficient":
+        raise typer.Exit(NEGATIVE)
+
+
+def console_text(found: Identification) -> str:
+    """Table of the essential parameters, trail, validation, trading parameters, coupling, then the verdict."""
+    coupling = "\n".join(
+        f"coupling of the drives in {key}: {fit.relative_error:.2f} % in total, per joint "
+        + " ".join(f"{joint.relative_error:.2f}" for joint in fit.per_joint)
+        for key, fit in found.coupling.items()
+    )
+    fit = found.found.estimate if found.every.status != "rank-deficient" else found.every
+    groups = "; ".join(", ".join(group) for group in found.weak.groups) or "none"
+    parts = [fit.to_table(), found.found.to_table(), *(part.to_table() for part in found.validation)]
+    parts += [f"parameters that trade against each other (|correlation| above {found.weak.threshold:g}): {groups}", coupling, found.verdict]
+    return "\n\n".join(part for part in parts if part)
+
+
+def estimate_json(found: Identification) -> str:
+    """estimate.json: the Estimate of all parameters, and beside it the essential ones, validation, coupling and verdict."""
+    import json
+
+    from runtime.estimate import json_text
+
+    return json_text({**json.loads(found.every.to_json()), **found.summary()})
+
+
+def identification_files(found: Identification, study: str) -> dict[str, str | bytes]:
+    """Contents of the output folder, by file name."""
+    from runtime.report import plots
+    from runtime.report.html import Page, Section, render
+    from runtime.report.sections import identification_sections, parameters_csv, torque_unit
+
+    unit = torque_unit(found)
+    overlay, residuals = plots.torque_overlay(found.comparison, unit), plots.residual_histogram(found.comparison, unit)
+    settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
+    page = Page(
+        title=f"{found.model.NAME}: identification on {found.name}",
+        verdict=found.verdict,
+        sections=[*identification_sections(found), settings],
+        footer=provenance_line(found),
+    )
+    return {
+        "report.html": render(page),
+        "estimate.json": estimate_json(found),
+        "parameters.csv": parameters_csv(found),
+        "parameters.tex": found.found.estimate.to_latex(),
+        "study.yaml": study,
+        "torques.png": plots.png(overlay),
+        "torques.svg": plots.svg(overlay),
+        "residuals.png": plots.png(residuals),
+    }
+
+
+def provenance_line(found: Identification) -> str:
+    """Hashes and versions that reproduce the result."""
+    provenance = found.every.provenance
+    files = ", ".join(f"{name} {digest[:12]}" for name, digest in provenance["files"].items())
+    versions = ", ".join(f"{name} {version}" for name, version in provenance["versions"].items())
+    return f"Robot {provenance['robot']}, SHA-256 {provenance['robot_sha256'][:12]}. Files (SHA-256): {files}. Versions: {versions}."

@@ -1,0 +1,104 @@
+"""What the verbs on records share: the model of a ROBOT argument, the study of a RECORD argument, errors as one line and exit code 2."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import typer
+
+if TYPE_CHECKING:
+    from runtime.model import GeneratedModel
+    from runtime.record import Record
+    from runtime.study import Study
+
+BAD_INPUT, NEGATIVE = 2, 1
+
+
+def single_thread() -> None:
+    """One BLAS thread unless the user set another number: matrices here are small and results then agree in every bit. Before numpy loads."""
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "BLIS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
+@contextmanager
+def reported_errors() -> Iterator[None]:
+    """Bad input as one message on the error stream and exit code 2, never a traceback."""
+    from runtime.errors import InputError
+    from symgen.errors import SymgenError
+
+    try:
+        yield
+    except (InputError, SymgenError) as e:
+        fail(str(e))
+    except OSError as e:
+        fail(f"{e.filename or 'file'}: {e.strerror or e}")
+
+
+def fail(message: str) -> NoReturn:
+    """End with `message` and exit code 2."""
+    typer.echo(f"error: {message}", err=True)
+    raise typer.Exit(BAD_INPUT)
+
+
+@contextmanager
+def opened_model(robot: str) -> Iterator[GeneratedModel]:
+    """The model of a packaged robot, a robot file (.yaml) or a generated module (.py).
+
+    A robot is emitted into a folder that lives as long as the block, since other processes load the model from its file.
+    """
+    from runtime.model import load_model
+
+    if Path(robot).suffix == ".py":
+        yield load_model(Path(robot))
+        return
+    from symgen.description import load_robot
+    from symgen.emit import generate_module
+
+    description = load_robot(robot)
+    text = generate_module(description)
+    with TemporaryDirectory(prefix="symgen-") as folder:
+        path = Path(folder) / f"{description.name}.py"
+        path.write_text(text, encoding="utf-8")
+        yield load_model(path)
+
+
+def study_and_records(record: str, model: GeneratedModel) -> tuple[Study, Path, list[Record]]:
+    """The study a RECORD argument means, the folder of its files, and its records."""
+    from runtime.errors import InputError
+    from runtime.io.records import read_records
+    from runtime.io.study_files import study_of
+
+    study, folder = study_of(record)
+    if not study.record:
+        raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=record)
+    return study, folder, read_records(study.record, model, folder=folder)
+
+
+def study_text(study: Study, folder: Path, destination: Path) -> str:
+    """study.yaml: every setting, defaults included; files relative to `destination`, where the study is written."""
+    from ruamel.yaml import YAML
+
+    from runtime.study import RecordSettings, to_mapping
+
+    def moved(settings: RecordSettings) -> RecordSettings:
+        if settings.dataset is not None:
+            return settings
+        files = tuple(Path(os.path.relpath(folder / file, destination)).as_posix() for file in settings.files)
+        return replace(settings, files=files)
+
+    record, further = tuple(moved(s) for s in study.record), tuple(moved(s) for s in study.validate.record)
+    complete = replace(study, record=record, validate=replace(study.validate, record=further))
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None
+    yaml.sort_base_mapping_type_on_output = False
+    yaml.width = 140
+    stream = StringIO()
+    yaml.dump(to_mapping(complete), stream)
+    return stream.getvalue()
