@@ -1,0 +1,120 @@
+"""`symgen demo`: the main job end to end, from the robot file of the TX40 to a report, on the measured record or, without it, on a simulated one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from symgen.cli.session import opened_model, reported_errors, single_thread, study_text
+from symgen.cli.writing import write_all
+
+if TYPE_CHECKING:
+    from runtime.model import GeneratedModel
+    from runtime.record import Record
+    from runtime.study import Study
+    from symgen.cli.demonstration import Demonstration
+
+ROBOT, DATASET = "tx40", "tx40"
+SEED = 1
+DURATION, SHORT = 9.0, 4.0  # s of the simulated record, and of that of the quick form
+
+
+def demo(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")] = Path("symgen-demo"),
+    quick: Annotated[bool, typer.Option("--quick", help="Two runs per step and no further studies.")] = False,
+) -> None:
+    """Identify the Stäubli TX40 and judge its encoder resolution, beside the published tables."""
+    single_thread()
+    with reported_errors(), opened_model(ROBOT) as model:
+        from symgen.cli.demonstration import demonstrate
+
+        study, record, extra, missing = measured_or_simulated(model, output, quick)
+        if missing:
+            typer.echo(
+                f"No measured record: {missing}\nContinuing on a SIMULATED record made on the spot; nothing below was measured.\n", err=True
+            )
+        shown = demonstrate(model, study, record, simulated=bool(missing), quick=quick, step=lambda text: typer.echo(f"  {text}", err=True))
+        write_all(output, {**demo_files(shown, study_text(shown.found.study, output, output)), **extra})
+        typer.echo(verdict(shown))
+        typer.echo(f"report: {output / 'report.html'}")
+
+
+def measured_or_simulated(model: GeneratedModel, output: Path, quick: bool) -> tuple[Study, Record, dict[str, bytes], str]:
+    """Study and record; where the measured one cannot be had: a simulated one, its file, and why."""
+    from runtime.errors import DataUnavailableError
+    from runtime.io.datasets import dataset_study
+    from runtime.io.records import read_records
+    from runtime.study import study_from_mapping
+
+    study = study_from_mapping(dataset_study(DATASET))
+    try:
+        return study, read_records(study.record, model)[0], {}, ""
+    except DataUnavailableError as e:
+        study, record, file = simulated_study(model, study, SHORT if quick else DURATION)
+        return study, record, file, str(e)
+
+
+def simulated_study(model: GeneratedModel, study: Study, duration: float) -> tuple[Study, Record, dict[str, bytes]]:
+    """The same settings on a simulated record, which takes the way through its file like any other."""
+    from dataclasses import replace
+    from tempfile import TemporaryDirectory
+
+    from runtime.io.records import read_records
+    from runtime.study import ValidateSettings
+    from symgen.cli.simulated import FILE, motor_record
+
+    content, settings = motor_record(model, duration, SEED)
+    study = replace(study, record=(settings,), rows=replace(study.rows, window=(0.0, duration)), validate=ValidateSettings())
+    with TemporaryDirectory(prefix="symgen-") as folder:
+        (Path(folder) / FILE).write_bytes(content)
+        record = read_records(study.record, model, folder=Path(folder))[0]
+    return study, record, {FILE: content}
+
+
+def verdict(shown: Demonstration) -> str:
+    """What the demo found, in one sentence."""
+    found, levels = shown.found, shown.resolution.levels
+    order: dict[str, list[str]] = {"unbiased": [], "doubtful": [], "biased": []}
+    for level in levels:
+        order[level.residual_verdict].append(level.level.label)
+    words = {"unbiased": "keep it practically unbiased", "doubtful": "make it doubtful", "biased": "bias it"}
+    steps = ", ".join(f"encoder steps of {' and '.join(labels)} {words[key]}" for key, labels in order.items() if labels)
+    label = "SIMULATED record: " if shown.simulated else ""
+    return (
+        f"{label}{len(found.found.names)} of {len(found.every.names)} parameters explain the torques of {found.model.NAME} to "
+        f"{found.found.estimate.relative_error:.1f} % and predict an unseen half to {found.predicted_error:.1f} %; by the residual of least squares, "
+        f"{steps}."
+    )
+
+
+def demo_files(shown: Demonstration, study: str) -> dict[str, str | bytes]:
+    """Contents of the output folder, by file name."""
+    from runtime.report import plots
+    from runtime.report.html import Page, Section, render
+    from runtime.report.sections import identification_sections
+    from symgen.cli.demo_sections import demo_sections
+    from symgen.cli.identify import identification_files, provenance_line
+
+    own, *others = identification_sections(shown.found)
+    settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
+    kind = "SIMULATED record, nothing measured" if shown.simulated else "public measured record"
+    page = Page(
+        title=f"{shown.found.model.NAME}: identification and encoder resolution, {kind}",
+        verdict=verdict(shown),
+        sections=[own, *demo_sections(shown), *others, settings],
+        warning="The measured record was not available: everything here was computed on a SIMULATED record, made from the values of the robot file "
+        "with encoder steps and torque noise. No figure in this report was measured."
+        if shown.simulated
+        else "",
+        footer=provenance_line(shown.found),
+    )
+    curve = plots.error_against_resolution(shown.curve or shown.resolution, ("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5"))
+    return {
+        **identification_files(shown.found, study),
+        "report.html": render(page),
+        "cestac.json": shown.resolution.to_json(),
+        "resolution.png": plots.png(curve),
+        "resolution.svg": plots.svg(curve),
+    }
