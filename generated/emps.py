@@ -77,8 +77,8 @@ def store(N):
 
 
 def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, 1) enter as contiguous rows (1, B), result ends in samples."""
-    states = [np.asarray(x, dtype=float).reshape(-1, 1) for x in states]
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
     N = len(states[0])
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):

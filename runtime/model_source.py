@@ -45,13 +45,13 @@ BUILTINS = _words(
     "property range repr reversed round set slice sorted staticmethod str sum super tuple type zip"
 )
 NUMPY = _words(
-    "abs absolute add all allclose any arange arccos arccosh arcsin arcsinh arctan arctan2 arctanh array array_equal asarray ascontiguousarray asfortranarray "
+    "abs absolute add all allclose any append arange arccos arccosh arcsin arcsinh arctan arctan2 arctanh array array_equal asarray ascontiguousarray asfortranarray "
     "atleast_1d atleast_2d atleast_3d block bool bool_ broadcast_arrays broadcast_shapes broadcast_to cbrt ceil clip column_stack concatenate copysign copyto cos cosh "
     "count_nonzero cross cumsum deg2rad diag diagonal diff divide dot e einsum empty empty_like errstate exp expand_dims eye fabs finfo flatnonzero float32 "
-    "float64 floating floor full full_like hstack hypot identity inf int32 int64 integer intp isfinite isinf isnan isscalar issubdtype kron linalg linspace log log10 log2 "
+    "float64 floating floor full full_like hstack hypot identity inf int32 int64 integer interp intp isfinite isinf isnan isscalar issubdtype kron linalg linspace log log10 log2 "
     "logical_and logical_not logical_or matmul max maximum may_share_memory mean meshgrid min minimum mod moveaxis multiply nan ndarray ndim negative newaxis nonzero "
     "number ones ones_like outer pi power prod promote_types rad2deg reciprocal remainder repeat require reshape result_type rint round shape shares_memory sign signbit "
-    "sin sinh size sqrt square squeeze stack subtract sum swapaxes take tan tanh tensordot tile trace transpose tri tril triu true_divide trunc vstack where "
+    "sin sinh size sqrt square squeeze stack subtract sum swapaxes take tan tanh tensordot tile trace transpose tri tril triu true_divide trunc unique vstack where "
     "zeros zeros_like"
 )
 LINALG = frozenset({"LinAlgError", "cholesky", "cond", "det", "eigvalsh", "inv", "lstsq", "norm", "qr", "solve", "svd"})

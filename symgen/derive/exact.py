@@ -165,11 +165,12 @@ class Draw:
             self._angles: dict[Monomial, Point] = {}
             if self._roots_exist():
                 break
+        self._rate: dict[tuple[int, int], Array] = {}
         self._directions: dict[tuple[tuple[int, Expression], ...], Array] = {}
-        self._q = {j: self._random(samples) for j in robot.joints}
-        self._qd = {j: self._random(samples) for j in robot.joints}
-        self._qdd = {j: self._random(samples) for j in robot.joints}
-        self._point = {j: self._circle(samples) for j in robot.joints}
+        self._q = {j: self._random(samples) for j in robot.moving}
+        self._qd = {j: self._random(samples) for j in robot.moving}
+        self._qdd = {j: self._random(samples) for j in robot.moving}
+        self._point = {j: self._circle(samples) for j in robot.moving}
 
     def _random(self, size: int) -> Array:
         return self.rng.integers(1, self.p, size)
@@ -275,6 +276,10 @@ class Draw:
 
     def qdd(self, j: int) -> Fp:
         return self._fp(self._qdd[j])
+
+    def rate(self, u: int, i: int) -> Scalar:
+        """Any value: a general loop does not close over F_p, so this proves identities of the open tree alone."""
+        return self._fp(self._rate.setdefault((u, i), self._random(self.samples)))
 
     def _forward(self, row: tuple[tuple[int, Expression], ...]) -> tuple[Fp, int]:
         """b of the direction class of a row, and whether the row runs along (1) or against (-1) it."""

@@ -23,9 +23,10 @@ class FloatAlgebra:
         q: Mapping[int, Array],
         qd: Mapping[int, Array] | None = None,
         qdd: Mapping[int, Array] | None = None,
+        rate: Mapping[tuple[int, int], Array] | None = None,
         constants: Mapping[str, float] | None = None,
     ) -> None:
-        self.robot, self._q, self._qd, self._qdd = robot, q, qd or {}, qdd or {}
+        self.robot, self._q, self._qd, self._qdd, self._rate = robot, q, qd or {}, qdd or {}, rate or {}
         self.constants = {**robot.constants, **(constants or {})}
 
     def constant(self, e: Expression) -> Scalar:
@@ -46,6 +47,9 @@ class FloatAlgebra:
 
     def qdd(self, j: int) -> Array:
         return self._qdd[j]
+
+    def rate(self, u: int, i: int) -> Array:
+        return self._rate[u, i]
 
     def sign(self, rate: Scalar, row: object) -> Scalar:
         return np.sign(rate)

@@ -155,7 +155,8 @@ def find_relations(robot: Robot) -> Found:
     for j in equations.unknown:
         if j not in in_loops:
             raise DescriptionError(
-                f"passive joint {j} has no relation: it is in no loop; declare q{j} under constraints or set mu: 1", path=("frames", j, "mu")
+                f"passive joint {j} has no relation: it is in no loop; declare q{j} under constraints or set mu: 1",
+                path=("frames", j, "mu"),
             )
     rng = np.random.default_rng(3)
     solutions = 0
@@ -272,7 +273,9 @@ def _coincide(robot: Robot, found: Found) -> bool:
 def _cannot_close(robot: Robot, equations: LoopEquations) -> DescriptionError:
     """Why no configuration closes: the declared relations, or the frames themselves."""
     loop, gap = max(((loop, equations.closest(loop)) for loop in robot.loops), key=lambda found: found[1])
-    where = f"frame {loop.cut} (cut) and frame {loop.twin} (twin) cannot coincide; they come as close as {gap:.3g} (positions per longest link)"
+    where = (
+        f"frame {loop.cut} (cut) and frame {loop.twin} (twin) cannot coincide; they come as close as {gap:.3g} (positions per longest link)"
+    )
     in_loops = {j for loop in robot.loops for k in (loop.cut, loop.twin) for j in robot.path(k)}
     declared = {j: e for j, e in robot.constraints.items() if j in in_loops}
     if declared:
@@ -282,7 +285,9 @@ def _cannot_close(robot: Robot, equations: LoopEquations) -> DescriptionError:
         except DescriptionError:
             return DescriptionError(f"{where}, with or without the declared relations", path=("loops", robot.loops.index(loop)))
         sides = [f"q{j}: declared {e}, the closure gives {_text(found, j)}" for j, e in declared.items() if j in found.row]
-        return DescriptionError(f"declared relations contradict the closure; {'; '.join(sides)}; {where}", path=("constraints", f"q{min(declared)}"))
+        return DescriptionError(
+            f"declared relations contradict the closure; {'; '.join(sides)}; {where}", path=("constraints", f"q{min(declared)}")
+        )
     return DescriptionError(f"{where}; check the lengths, alpha, theta and the row of the twin", path=("loops", robot.loops.index(loop)))
 
 
@@ -301,4 +306,6 @@ def close(robot: Robot) -> Closure:
         return open_tree(robot)
     found = find_relations(robot)
     free = (*robot.joints, *found.tied)
-    return Closure(robot, {j: {j: ONE} for j in free} | dict(found.row), dict.fromkeys(free, ZERO) | dict(found.offset), found.tied, found.start)
+    return Closure(
+        robot, {j: {j: ONE} for j in free} | dict(found.row), dict.fromkeys(free, ZERO) | dict(found.offset), found.tied, found.start
+    )

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
+from symgen.derive.loops import close
+from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.spec import WIDTH, ModuleSpec, unit
 
@@ -24,6 +26,7 @@ def header(spec: ModuleSpec) -> list[str]:
         "Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET",
         "Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments",
         *(f"Element     {line}" for line in element_lines(robot)),
+        *(f"Loop        {line}" for line in loop_lines(robot)),
         "",
         f"Base parameters, {len(regrouping)} of {len(robot.parameters)}; Gautier and Khalil (1990), exact",
     ]
@@ -35,8 +38,9 @@ def header(spec: ModuleSpec) -> list[str]:
         lines += wrapped("as they are: " + " ".join(alone), "    ")
     lines += wrapped("No effect: " + (" ".join(regrouping.no_effect) or "none"), "")
     lines += ["", "Cost per sample"]
-    for name in ("regressor", "inverse_dynamics", "inertia_matrix", "bias", "gravity", "frame_poses"):
-        lines.append(f"    {name:<17} {getattr(spec, name).cost}")
+    for name in ("regressor", "inverse_dynamics", "inertia_matrix", "bias", "gravity", "frame_poses", "closure", "curvature"):
+        if getattr(spec, name) is not None:
+            lines.append(f"    {name:<17} {getattr(spec, name).cost}")
     return lines
 
 
@@ -73,6 +77,23 @@ def element_lines(robot: Robot) -> list[str]:
     return lines
 
 
+def loop_lines(robot: Robot) -> list[str]:
+    """The loops, and every passive joint as a function of others."""
+    closure = close(robot)
+    lines = [f"frame {loop.twin} coincides with cut frame {loop.cut}" for loop in robot.loops]
+    for j in robot.passive:
+        if j in closure.tied:
+            continue
+        total = closure.offset[j]
+        for i, g in closure.row[j].items():
+            total = total + g * Expression.symbol(f"q{i}")
+        lines.append(f"q{j} = {total}" + (" (declared)" if j in robot.constraints else ""))
+    if closure.tied:
+        start = ", ".join(f"q{j} = {closure.start[j]:.4g}" for j in closure.independent)
+        lines.append(f"q{', q'.join(map(str, closure.tied))} from the closure equations by Newton; assembly mode of {start}")
+    return lines
+
+
 def _times(c: Any, name: str) -> str:
     return name if str(c) == "1" else f"{c}*{name}"
 
@@ -94,6 +115,7 @@ def tables(spec: ModuleSpec) -> list[str]:
         f"NAME = {robot.name!r}",
         f"SOURCE_SHA256 = {robot.sha256!r}",
         f"JOINTS = {robot.joints!r}",
+        *([f"PASSIVE = {robot.passive!r}"] if robot.passive else []),
         *literal("CONSTANTS", dict(robot.constants)),
         *literal("BASE_PARAMETERS", regrouping.names),
         *literal("STANDARD_PARAMETERS", robot.parameters),

@@ -18,15 +18,19 @@ from symgen.version import VERSION
 
 BLOCK = 4096
 SUMMARIES = {
-    "regressor": ("q, qd, qdd, D", "Fill D, shape ({b}, {n}, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: ({n}, N)."),
-    "inverse_dynamics": ("q, qd, qdd, GAM, X", "Fill GAM, shape ({n}, N). q, qd, qdd: ({n}, N)."),
+    "regressor": ("q, qd, qdd, D", "Fill D, shape ({b}, {n}, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: ({k}, N)."),
+    "inverse_dynamics": ("q, qd, qdd, GAM, X", "Fill GAM, shape ({n}, N). q, qd, qdd: ({k}, N)."),
     "inertia_matrix": (
         "q, A, X",
-        "Fill A, shape ({n}, {n}, N): column i is Gamma for a unit acceleration of joint i from rest. q: ({n}, N).",
+        "Fill A, shape ({n}, {n}, N): column i is Gamma for a unit acceleration of joint i from rest. q: ({k}, N).",
     ),
-    "bias": ("q, qd, GAM, X", "Fill GAM, shape ({n}, N), for qdd = 0. q, qd: ({n}, N)."),
-    "gravity": ("q, GAM, X", "Fill GAM, shape ({n}, N), at rest. q: ({n}, N)."),
-    "frame_poses": ("q, T", "Fill T, shape ({frames}, 4, 4, N). q: ({n}, N)."),
+    "bias": ("q, qd, GAM, X", "Fill GAM, shape ({n}, N), for qdd = 0. q, qd: ({k}, N)."),
+    "gravity": ("q, GAM, X", "Fill GAM, shape ({n}, N), at rest. q: ({k}, N)."),
+    "frame_poses": ("q, T", "Fill T, shape ({frames}, 4, 4, N). q: ({k}, N)."),
+}
+LOOP_SUMMARIES = {
+    "closure": ("q, R", "Fill R, shape ({m}, 1 + {k}, N): closure residuals, then their derivatives by the joints. q: ({k}, N)."),
+    "curvature": ("q, qd, B", "Fill B, shape ({m}, N): second derivatives of the residuals at constant rates. q, qd: ({k}, N)."),
 }
 
 
@@ -42,7 +46,16 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     robot, regrouping = spec.robot, spec.regrouping
     constants = list(robot.constants)
     defaults = "".join(f", {name}={robot.constants[name]!r}" for name in constants)
-    sizes = {"n": len(robot.joints), "b": len(regrouping), "frames": len(robot.frames), "p": len(robot.parameters)}
+    closure = close(robot)
+    general = bool(closure.tied)
+    sizes = {
+        "n": len(robot.joints),
+        "m": len(closure.tied),
+        "k": len(closure.independent),
+        "b": len(regrouping),
+        "frames": len(robot.frames),
+        "p": len(robot.parameters),
+    }
     context = {
         **sizes,
         "title": plain(robot.title or robot.name),
@@ -52,6 +65,9 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         "command": plain(command or robot.file or robot.name),
         "size": BLOCK,
         "header": [plain(line) for line in header(spec)],
+        "general": general,
+        "passive": bool(robot.passive),
+        "passive_rows": _passive_rows(robot),
         "tables": [*tables(spec), *_paths(robot)],
         "constant_entries": spec.constant_entries,
         "constants": "".join(f", {name}" for name in constants),
@@ -61,7 +77,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         "unpack": _unpack(robot),
         "formulas": _formulas(spec),
         "packed": packed(list(regrouping.names)),
-        "blocks": [_block(name, getattr(spec, name), sizes, constants) for name in SUMMARIES],
+        "blocks": [_block(name, spec, sizes, constants) for name in (*SUMMARIES, *(LOOP_SUMMARIES if general else ()))],
     }
     return _environment().get_template("module.py.jinja").render(context)
 
@@ -71,15 +87,29 @@ def plain(text: str) -> str:
     return " ".join(text.replace("\\", "/").replace('"""', "'''").split(" ")).replace("\r", " ").replace("\n", " ")
 
 
-def _block(name: str, function: Function, sizes: dict[str, int], constants: list[str]) -> dict[str, object]:
-    arguments, summary = SUMMARIES[name]
-    sections = function.sections or (Section("Nothing acts", ("pass",)),)
+def _block(name: str, spec: ModuleSpec, sizes: dict[str, int], constants: list[str]) -> dict[str, object]:
+    arguments, summary = (SUMMARIES | LOOP_SUMMARIES)[name]
+    if spec.tied and name in SUMMARIES:  # every state of the closed mechanism
+        arguments = "q, qd, qdd, G, " + arguments.replace("qdd, ", "").replace("qd, ", "").replace("q, ", "")
+        summary = summary.split(" q: ")[0].split(" q, qd")[0] + " q, qd, qdd: ({k}, N); G: ({m}*{n}, N)."
+    sections = getattr(spec, name).sections or (Section("Nothing acts", ("pass",)),)
     return {
         "name": f"_{name}_block",
         "arguments": ", ".join([arguments, *constants]),
         "summary": summary.format(**sizes),
         "sections": sections,
     }
+
+
+def _passive_rows(robot: Robot) -> dict[str, list[str]]:
+    """The passive joints as rows over the independent ones: rates and constants, as source."""
+    closure = close(robot)
+    rows, offsets = [], []
+    for j in robot.passive:
+        row = closure.row[j]
+        rows.append("[" + ", ".join(_code(str(row[i])) if i in row else "0" for i in closure.independent) + "],")
+        offsets.append(_code(str(closure.offset[j])))
+    return {"rates": rows, "offsets": [f"[{', '.join(offsets)}]"]}
 
 
 def _unpack(robot: Robot) -> list[str]:
@@ -99,11 +129,12 @@ def _code(text: str) -> str:
 def _paths(robot: Robot) -> list[str]:
     """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the actuated ones move them."""
     closure = close(robot)
-    column = {j: k for k, j in enumerate(robot.joints)}
+    column = {j: k for k, j in enumerate(closure.independent)}
     paths = {}
     for f in robot.frames:
         moving = [robot.frame(i) for i in robot.path(f.j) if robot.frame(i).sigma != FIXED]
         paths[f.j] = tuple(
             (m.j, m.sigma, tuple((column[i], float(g.value(robot.constants))) for i, g in closure.row[m.j].items())) for m in moving
         )
-    return literal("_PATHS", paths)
+    start = [f"_START = {tuple(closure.start[j] for j in closure.independent)!r}"] if closure.tied else []
+    return [*literal("_PATHS", paths), *start]

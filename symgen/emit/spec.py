@@ -12,7 +12,9 @@ from textwrap import wrap
 from symgen.derive.columns import columns, element_names, inertial_names
 from symgen.derive.elements import element_column
 from symgen.derive.geometry import Geometry
+from symgen.derive.loop_equations import loop_system
 from symgen.derive.loops import close
+from symgen.derive.names import Names
 from symgen.derive.graph import Scalar
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.kinematics import frame_poses
@@ -25,7 +27,7 @@ from symgen.regroup.regrouping import Regrouping
 
 WIDTH = 120
 STATES = {"q": "q", "qd": "QP", "qdd": "QDP"}
-LOCALS = ("D", "GAM", "A", "T", "X", "np", "q", "qd", "qdd", "S", "out", "N")
+LOCALS = ("D", "GAM", "A", "T", "X", "G", "R", "B", "np", "q", "qd", "qdd", "S", "out", "N")
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,13 @@ class ModuleSpec:
     bias: Function
     gravity: Function
     frame_poses: Function
+    closure: Function | None = None  # general loops: residual and Jacobian of the closure equations
+    curvature: Function | None = None  # general loops: Jd qd
+
+    @property
+    def tied(self) -> tuple[int, ...]:
+        """Passive joints that only the closure equations tie to the actuated ones."""
+        return close(self.robot).tied
 
 
 def module_spec(regrouping: Regrouping) -> ModuleSpec:
@@ -75,6 +84,8 @@ def module_spec(regrouping: Regrouping) -> ModuleSpec:
         bias=_torques(regrouping, acceleration=False),
         gravity=_torques(regrouping, acceleration=False, velocity=False),
         frame_poses=_frame_poses(robot),
+        closure=_closure(robot) if close(robot).tied else None,
+        curvature=_curvature(robot) if close(robot).tied else None,
     )
 
 
@@ -115,10 +126,11 @@ def _aligned(lines: Sequence[str]) -> tuple[str, ...]:
 
 def _function(robot: Robot, text: Text, results: Iterable[Section], parameters: Sequence[str] = ()) -> Function:
     needed = text.inputs
+    independent = close(robot).independent
     inputs: list[str] = []
     states: list[str] = []
     for state, letter in STATES.items():
-        names = [f"{letter}{j}" for j in robot.joints]
+        names = [f"{letter}{j}" for j in independent]
         used = [name for name in names if name in needed]
         if used:
             states.append(state)
@@ -126,6 +138,8 @@ def _function(robot: Robot, text: Text, results: Iterable[Section], parameters: 
             inputs += _unpack(names, state)
         else:
             inputs += [f"{name} = {state}[{names.index(name)}]" for name in used]
+    rates = [Names(len(robot.frames))("G", u, i) for u in close(robot).tied for i in robot.joints]
+    inputs += [f"{name} = G[{k}]" for k, name in enumerate(rates) if name in needed]
     used = [name for name in parameters if name in needed]
     if used and used == list(parameters):
         inputs += _unpack(used, "X")
@@ -203,9 +217,26 @@ def _frame_poses(robot: Robot) -> Function:
         A, P = pose[f.j]
         entries += [(f"T[{row}, {k}, {m}]", A[k][m]) for k in range(3) for m in range(3)]
         entries += [(f"T[{row}, {k}, 3]", P[k]) for k in range(3)]
+    return _assignments(robot, algebra, entries, "Poses")
+
+
+def _closure(robot: Robot) -> Function:
+    algebra, system = GraphAlgebra(robot), loop_system(robot)
+    entries = [(f"R[{k}, 0]", x) for k, x in enumerate(system.residual(algebra))]
+    for k, row in enumerate(system.jacobian(algebra)):
+        entries += [(f"R[{k}, {column}]", x) for column, x in enumerate(row, start=1)]
+    return _assignments(robot, algebra, entries, "Residuals and their derivatives by the joints")
+
+
+def _curvature(robot: Robot) -> Function:
+    algebra, system = GraphAlgebra(robot), loop_system(robot)
+    entries = [(f"B[{k}]", x) for k, x in enumerate(system.curvature(algebra))]
+    return _assignments(robot, algebra, entries, "Second derivatives at constant rates")
+
+
+def _assignments(robot: Robot, algebra: GraphAlgebra, entries: Sequence[tuple[str, Scalar | int]], title: str) -> Function:
     text = Text([value for _, value in entries], algebra.sections, (*LOCALS, *robot.constants))
-    lines = tuple(f"{target} = {text.expression(value)}" for target, value in entries)
-    return _function(robot, text, [Section("Poses", lines)])
+    return _function(robot, text, [Section(title, tuple(f"{target} = {text.expression(value)}" for target, value in entries))])
 
 
 def unit(robot: Robot, name: str) -> str:

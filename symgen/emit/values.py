@@ -141,5 +141,7 @@ class Program:
             return self.draw._constants[name]
         if name == "pi":
             return self._rng.integers(1, self.p, 1)
+        if name.startswith("G"):  # rate of a tied joint
+            return self._parameter.setdefault(name, self._rng.integers(1, self.p, SAMPLES))
         kind, j = name.rstrip("0123456789"), int(name[len(name.rstrip("0123456789")) :])
         return {"q": self.draw.q, "QP": self.draw.qd, "QDP": self.draw.qdd}[kind](j).x

@@ -1,0 +1,84 @@
+"""The closure equations of general loops: as many as there are tied joints, with Jacobian and curvature, over any algebra.
+
+Loop: 0T_cut = 0T_twin. Residuals are the three components of P_cut - P_twin in frame 0 and of the axial vector of A_cut' A_twin (zero where the
+orientations agree); `chosen` are the rows that determine the tied joints best at the start configuration. Then
+
+    r(q) = 0 ,    J qd = 0 ,    J qdd + Jd qd = 0 .
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from symgen.derive.closure import Closure
+from symgen.derive.float_algebra import FloatAlgebra
+from symgen.derive.geometry import Geometry
+from symgen.derive.jets import JetAlgebra, jet
+from symgen.derive.kinematics import frame_poses
+from symgen.derive.loops import close
+from symgen.derive.scalar import Algebra, Scalar, dot, sub
+from symgen.description.robot import Robot
+
+
+def residuals(robot: Robot, algebra: Algebra, closure: Closure) -> list[Scalar]:
+    """All residuals of all loops, six each."""
+    pose = frame_poses(Geometry(robot, algebra, closure))
+    rows: list[Scalar] = []
+    for loop in robot.loops:
+        algebra.section(f"Loop: frame {loop.twin} on frame {loop.cut}")
+        (A, P), (B, Q) = pose[loop.cut], pose[loop.twin]
+        rows += [sub(P[k], Q[k]) for k in range(3)]
+        C = [[dot([A[k][m] for k in range(3)], [B[k][n] for k in range(3)]) for n in range(3)] for m in range(3)]
+        rows += [sub(C[2][1], C[1][2]), sub(C[0][2], C[2][0]), sub(C[1][0], C[0][1])]
+    return rows
+
+
+@dataclass(frozen=True)
+class LoopSystem:
+    """The chosen equations of a robot with tied joints."""
+
+    robot: Robot
+    closure: Closure
+    chosen: tuple[int, ...]
+
+    def residual(self, algebra: Algebra) -> list[Scalar]:
+        rows = residuals(self.robot, JetAlgebra(algebra, {}), self.closure)
+        return [jet(rows[k]).x for k in self.chosen]
+
+    def jacobian(self, algebra: Algebra) -> list[list[Scalar]]:
+        """[equation][independent joint]."""
+        columns = []
+        for i in self.closure.independent:
+            rows = residuals(self.robot, JetAlgebra(algebra, {i: 1}), self.closure)
+            columns.append([jet(rows[k]).xd for k in self.chosen])
+        return [list(row) for row in zip(*columns, strict=True)]
+
+    def curvature(self, algebra: Algebra) -> list[Scalar]:
+        """Jd qd."""
+        rows = residuals(self.robot, JetAlgebra(algebra, {i: algebra.qd(i) for i in self.closure.independent}), self.closure)
+        return [jet(rows[k]).xdd for k in self.chosen]
+
+
+@lru_cache(maxsize=64)
+def loop_system(robot: Robot) -> LoopSystem:
+    """Choose the equations: pivoted elimination of their Jacobian in the tied joints at the start configuration."""
+    closure = close(robot)
+    h = 1e-6
+    everything = LoopSystem(robot, closure, tuple(range(6 * len(robot.loops))))
+    J = np.zeros((6 * len(robot.loops), len(closure.tied)))
+    for column, u in enumerate(closure.tied):
+        sides = []
+        for step in (h, -h):
+            q = {j: np.asarray(closure.start[j] + (step if j == u else 0.0)) for j in closure.independent}
+            sides.append(np.array([float(x) for x in everything.residual(FloatAlgebra(robot, q))]))
+        J[:, column] = (sides[0] - sides[1]) / (2 * h)
+    chosen: list[int] = []
+    for _ in closure.tied:
+        row = int(np.argmax(np.linalg.norm(J, axis=1)))
+        chosen.append(row)
+        direction = J[row] / np.linalg.norm(J[row])
+        J = J - np.outer(J @ direction, direction)
+    return LoopSystem(robot, closure, tuple(sorted(chosen)))
