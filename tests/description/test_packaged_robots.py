@@ -11,8 +11,8 @@ from symgen.description.robot import FIXED, PRISMATIC
 FOUR = {"Ia": "inertia", "FV": "viscous", "FS": "coulomb", "OFFSET": "offset"}
 # standard parameters: ten per link and one per joint of each of Ia, FV, FS, OFFSET
 STANDARD = {
-    "emps": 14, "emps_asymmetric": 15, "panda": 98, "planar_2r": 28, "puma560": 84, "rx90": 84, "scara": 56, "stanford": 84,
-    "two_branch": 108, "tx40": 86, "tx40_table1": 84,
+    "emps": 14, "emps_asymmetric": 15, "five_bar": 48, "four_bar": 34, "haptic": 78, "panda": 98, "planar_2r": 28, "puma560": 84, "rx90": 84,
+    "scara": 56, "sr400": 104, "stanford": 84, "two_branch": 108, "tx40": 86, "tx40_table1": 84,
 }  # fmt: skip
 
 
@@ -34,7 +34,10 @@ def test_standard_parameters(name, count):
     assert not robot.values or set(robot.values) == set(robot.parameters)
 
 
-@pytest.mark.parametrize("name", ["tx40_table1", "rx90", "puma560", "stanford", "scara", "panda", "planar_2r", "two_branch", "emps"])
+@pytest.mark.parametrize(
+    "name",
+    ["tx40_table1", "rx90", "puma560", "stanford", "scara", "panda", "planar_2r", "two_branch", "emps", "sr400", "four_bar", "five_bar"],
+)
 def test_friction_and_actuators_on_every_joint(name):
     robot = load_robot(name)
     assert {e.family: e.kind for e in robot.elements} == FOUR
@@ -103,3 +106,27 @@ def test_two_branch_shape():
     assert [f.j for f in robot.frames if f.sigma == FIXED] == [5]
     assert [f.j for f in robot.frames if f.sigma == PRISMATIC] == [3]
     assert len(set(robot.constants.values())) == len(robot.constants)
+
+
+def test_haptic_table_5():
+    """Chapter Table 5 as printed: ant, mu, sigma, gamma, b, alpha, d, r."""
+    rows = [[str(x) for x in (f.ant, f.mu, f.sigma, f.gamma, f.b, f.alpha, f.d, f.r)] for f in load_robot("haptic").frames]
+    assert rows == [row.split() for row in """
+        0 1 0 0 0 0     0   0
+        1 1 0 0 0 -pi/2 0   0
+        2 0 0 0 0 0     D3  0
+        3 0 0 0 0 0     D4  0
+        1 1 0 0 0 -pi/2 0   0
+        5 0 0 0 0 0     D6  0
+        6 0 0 0 0 0     D3  0
+        3 0 2 0 0 0     -D6 0
+    """.strip().splitlines()]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "loop"), [("haptic", (7, 8)), ("sr400", (9, 10)), ("four_bar", (4, 5)), ("five_bar", (5, 6))])
+def test_loops(name, loop):
+    """One loop each; what a file assumes beyond its source is said in its comments."""
+    robot = load_robot(name)
+    assert [(x.cut, x.twin) for x in robot.loops] == [loop]
+    text = (resources.files("symgen.description") / "robots" / robot.file).read_text(encoding="utf-8")
+    assert "assum" in text or "example" in text
