@@ -45,7 +45,7 @@ BUILTINS = _words(
     "property range repr reversed round set slice sorted staticmethod str sum super tuple type zip"
 )
 NUMPY = _words(
-    "abs absolute add all allclose any append arange arccos arccosh arcsin arcsinh arctan arctan2 arctanh array array_equal asarray ascontiguousarray asfortranarray "
+    "abs absolute add all allclose any append arange arccos argmax arccosh arcsin arcsinh arctan arctan2 arctanh array array_equal asarray ascontiguousarray asfortranarray "
     "atleast_1d atleast_2d atleast_3d block bool bool_ broadcast_arrays broadcast_shapes broadcast_to cbrt ceil clip column_stack concatenate copysign copyto cos cosh "
     "count_nonzero cross cumsum deg2rad diag diagonal diff divide dot e einsum empty empty_like errstate exp expand_dims eye fabs finfo flatnonzero float32 "
     "float64 floating floor full full_like hstack hypot identity inf int32 int64 integer interp intp isfinite isinf isnan isscalar issubdtype kron linalg linspace log log10 log2 "

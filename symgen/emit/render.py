@@ -12,7 +12,7 @@ from symgen.derive.loops import close
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.header import header, literal, packed, tables
 from symgen.emit.printers import Section
-from symgen.emit.spec import WIDTH, Function, ModuleSpec
+from symgen.emit.spec import WIDTH, ModuleSpec
 from symgen.regroup.regrouping import formula
 from symgen.version import VERSION
 

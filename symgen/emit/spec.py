@@ -12,12 +12,12 @@ from textwrap import wrap
 from symgen.derive.columns import columns, element_names, inertial_names
 from symgen.derive.elements import element_column
 from symgen.derive.geometry import Geometry
-from symgen.derive.loop_equations import loop_system
-from symgen.derive.loops import close
-from symgen.derive.names import Names
 from symgen.derive.graph import Scalar
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.kinematics import frame_poses
+from symgen.derive.loop_equations import loop_system
+from symgen.derive.loops import close
+from symgen.derive.names import Names
 from symgen.derive.newton_euler import Motion, joint_torques
 from symgen.derive.scalar import add, mul
 from symgen.description.robot import PRISMATIC, Robot

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symgen.derive.exact import Array, Draw, Fp, power
 from symgen.derive.graph import CONST, COS, INV, POS, SIGN, SIN, SQRT, Graph, Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.exact import Array, Draw, Fp, power
 
 SAMPLES = 3
 
@@ -108,9 +108,9 @@ class Program:
             case "const":
                 return np.array([node.value.numerator * pow(node.value.denominator, -1, p) % p])
             case "add":
-                return (self._operand(node.operands[0]) + self._operand(node.operands[1])) % p
+                return np.asarray((self._operand(node.operands[0]) + self._operand(node.operands[1])) % p)
             case "mul":
-                return self._operand(node.operands[0]) * self._operand(node.operands[1]) % p
+                return np.asarray(self._operand(node.operands[0]) * self._operand(node.operands[1]) % p)
             case "cos" | "sin":
                 turn, offset = self.algebra.angles[source.index]
                 point = self.draw.cos_sin(turn, offset)[node.op == "sin"]

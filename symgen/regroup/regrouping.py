@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from symgen.derive.columns import element_names, inertial_names
+from symgen.derive.exact import Draw, Fp
 from symgen.description.expression import ONE, ZERO, Call, Expression
 from symgen.description.robot import PRISMATIC, Robot
-from symgen.derive.exact import Draw, Fp
 from symgen.regroup.finite_field import rref
 from symgen.regroup.rules import Combination, Step, Transfer
 from symgen.regroup.solve import coefficients, sample, states_for
