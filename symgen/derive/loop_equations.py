@@ -45,8 +45,8 @@ class LoopSystem:
     chosen: tuple[int, ...]
 
     def residual(self, algebra: Algebra) -> list[Scalar]:
-        rows = residuals(self.robot, JetAlgebra(algebra, {}), self.closure)
-        return [jet(rows[k]).x for k in self.chosen]
+        rows = residuals(self.robot, algebra, self.closure)
+        return [rows[k] for k in self.chosen]
 
     def jacobian(self, algebra: Algebra) -> list[list[Scalar]]:
         """[equation][independent joint]."""

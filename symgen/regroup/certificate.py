@@ -15,12 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symgen.derive.exact import Array, Draw, Fp, angle_denominators, primes_for
+from symgen.derive.exact import PI, Array, Draw, Fp, angle_denominators, primes_for
+from symgen.derive.loops import close
+from symgen.description.expression import Expression
 from symgen.regroup.finite_field import rref
-from symgen.regroup.regrouping import Regrouping
+from symgen.regroup.general import identities
+from symgen.regroup.regrouping import NUMERIC, Regrouping
 from symgen.regroup.solve import sample, states_for
 
-PI = (("pi", 1),)
 Sampler = Callable[[Draw, tuple[str, ...]], Array]
 
 
@@ -52,6 +54,8 @@ class Certificate:
 def certify(regrouping: Regrouping, *, seed: int = 101, sampler: Sampler = sample) -> Certificate:
     """Check every formula of `regrouping`. `sampler` gives the standard regressor over F_p (a test may pass a wrong one)."""
     robot = regrouping.robot
+    if close(robot).tied:
+        return _certify_general(regrouping, seed)
     primes = primes_for(angle_denominators(robot)[PI], 2)
     failures: list[str] = []
     ranks: list[int] = []
@@ -65,6 +69,20 @@ def certify(regrouping: Regrouping, *, seed: int = 101, sampler: Sampler = sampl
             failures.append(f"rank modulo {p} is {ranks[-1]}, not {len(regrouping)}: the base columns are dependent")
         failures += _false_identities(regrouping, draw, W, index, base)
     return Certificate(len(regrouping), min(ranks), primes, len(robot.parameters), tuple(failures))
+
+
+def _certify_general(regrouping: Regrouping, seed: int) -> Certificate:
+    """General loops: the same identities in 60 digits, at lengths and states not used before."""
+    robot = regrouping.robot
+    K: dict[str, dict[str, Expression]] = {}
+    for b in regrouping.base:
+        for name, c in b.combination.items():
+            K.setdefault(name, {})[b.own] = c
+    rank, wrong = identities(robot, regrouping.own, robot.parameters, K, seed, regrouping.method != NUMERIC)
+    failures = [f"column of {name} is not what the formulas say (60 digits)" for name in wrong]
+    if rank != len(regrouping):
+        failures.append(f"rank in 60 digits is {rank}, not {len(regrouping)}: the base columns are dependent")
+    return Certificate(len(regrouping), rank, (), len(robot.parameters), tuple(failures))
 
 
 def _false_identities(regrouping: Regrouping, draw: Draw, W: Array, index: dict[str, int], base: Array) -> list[str]:

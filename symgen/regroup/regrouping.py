@@ -7,18 +7,23 @@ Khalil's order of preference; the few particular relations left are solved exact
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from symgen.derive.columns import element_names, inertial_names
 from symgen.derive.exact import Draw, Fp
+from symgen.derive.loops import close
 from symgen.description.expression import ONE, ZERO, Call, Expression
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.regroup.finite_field import rref
+from symgen.regroup.general import base_and_relations
 from symgen.regroup.rules import Combination, Step, Transfer
 from symgen.regroup.solve import coefficients, sample, states_for
 
 FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
+EXACT = "exact over F_p"
+RECOGNISED = "recognised from 60-digit sampling"
+NUMERIC = "numeric, for the constants of the robot file; coefficients not recognised"
 LAST_CHOICE = ("MZ", "M", "YY")
 
 
@@ -43,6 +48,7 @@ class Regrouping:
     base: tuple[BaseParameter, ...]
     no_effect: tuple[str, ...]
     steps: tuple[Step, ...] = field(repr=False, default=())  # recursive form: (from, into, coefficient)
+    method: str = EXACT
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -60,21 +66,22 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     """Derive the base parameters of `robot`. `seed` changes the random draws, never the result."""
     transfer = Transfer(robot)
     names = preference(robot, transfer.kept)
+    if close(robot).tied:
+        return _regroup_general(robot, transfer, names)
     samples = states_for(robot, len(names))
     draw = Draw(robot, seed, samples)
     pivots, R = rref(sample(draw, names), draw.p)
     base = tuple(names[c] for c in pivots)
-    combination: dict[str, Combination] = {name: transfer.combination[name] for name in base}
-    steps = list(transfer.steps)
     dependent = [c for c in range(len(names)) if c not in pivots]
     supports = {names[c]: tuple(base[k] for k in range(len(base)) if R[k, c]) for c in dependent}
-    for name, found in coefficients(robot, supports).items():
-        for target, beta in zip(supports[name], found, strict=True):
-            steps.append((name, target, beta))
-            into = combination[target]
-            for standard, value in transfer.combination[name].items():
-                into[standard] = into.get(standard, ZERO) + beta * value
-    return _assemble(robot, combination, steps, draw)
+    relations = {name: dict(zip(supports[name], found, strict=True)) for name, found in coefficients(robot, supports).items()}
+    return _assemble(robot, transfer, base, relations, draw)
+
+
+def _regroup_general(robot: Robot, transfer: Transfer, names: tuple[str, ...]) -> Regrouping:
+    base, relations, exact = base_and_relations(robot, names)
+    regrouping = _assemble(robot, transfer, base, relations, Draw(robot, 1, 1))
+    return replace(regrouping, method=RECOGNISED if exact else NUMERIC)
 
 
 def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -97,17 +104,28 @@ def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(sorted(names, key=rank))
 
 
-def _assemble(robot: Robot, combination: dict[str, Combination], steps: list[Step], draw: Draw) -> Regrouping:
+def _assemble(
+    robot: Robot, transfer: Transfer, base: tuple[str, ...], relations: Mapping[str, Mapping[str, Expression]], draw: Draw
+) -> Regrouping:
+    """Base parameters from the general transfer and the particular relations {dependent: {base column: coefficient}}."""
+    combination: dict[str, Combination] = {name: transfer.combination[name] for name in base}
+    steps = list(transfer.steps)
+    for dependent, relation in relations.items():
+        for target, beta in relation.items():
+            steps.append((dependent, target, beta))
+            into = combination[target]
+            for standard, value in transfer.combination[dependent].items():
+                into[standard] = into.get(standard, ZERO) + beta * value
     order = {name: k for k, name in enumerate(robot.parameters)}
-    base: list[BaseParameter] = []
+    parameters: list[BaseParameter] = []
     used: set[str] = set()
     for own in sorted(combination, key=order.__getitem__):
         terms = {name: simplified(c) for name, c in combination[own].items()}
         terms = {name: c for name, c in sorted(terms.items(), key=lambda nc: (nc[0] != own, order[nc[0]])) if not _vanishes(c, draw)}
         used |= set(terms)
-        base.append(BaseParameter(own if terms == {own: ONE} else own + "R", own, terms))
+        parameters.append(BaseParameter(own if terms == {own: ONE} else own + "R", own, terms))
     no_effect = tuple(name for name in robot.parameters if name not in used)
-    return Regrouping(robot, tuple(base), no_effect, tuple(steps))
+    return Regrouping(robot, tuple(parameters), no_effect, tuple(steps))
 
 
 def _vanishes(c: Expression, draw: Draw) -> bool:
