@@ -45,7 +45,9 @@ def select_rows(record: Record, qd: Array, signals: Signals, rows: Rows, *, keep
     instants = kept + samples.start
     if len(kept) <= 2 * rows.trim:
         raise InputError(
-            f"{len(kept)} rows per joint after decimation by {factor}, of which rows.trim leaves out {2 * rows.trim}", file=record.name
+            f"{len(kept)} rows per joint after decimation by {factor}, of which rows.trim leaves out {2 * rows.trim}; "
+            "use a longer record or window, or a smaller rows.trim",
+            file=record.name,
         )
     mask = np.ones((record.n, len(kept)), dtype=bool)
     dropped = {}

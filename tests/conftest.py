@@ -1,6 +1,51 @@
-"""Puts tests/ on the import path (`from oracles... import ...`) and makes hypothesis reproducible."""
+"""Puts tests/ on the import path (`from oracles... import ...`), makes hypothesis reproducible, and finds the measured records.
 
+Records: SYMGEN_DATA, the cache, then ../shared/data beside the repository; else the test is skipped, or fails where they are required.
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy loads: test processes would fight for the cores
+
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
+
+from runtime.errors import DataUnavailableError
+from runtime.io.datasets import DATASETS, fetch, locate
 
 settings.register_profile("symgen", derandomize=True, deadline=None)
 settings.load_profile("symgen")
+
+BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def _provide(name, patch):
+    files = DATASETS[name].files
+    if any(locate(name, file) is None for file in files) and BESIDE.is_dir():
+        patch.setenv("SYMGEN_DATA", str(BESIDE))
+    required = os.environ.get("SYMGEN_REQUIRE_DATA") == "1"
+    if required:
+        try:
+            return {file: fetch(name, file) for file in files}
+        except DataUnavailableError as e:
+            pytest.fail(f"SYMGEN_REQUIRE_DATA=1 but {e}")
+    paths = {file: locate(name, file) for file in files}
+    if None in paths.values():
+        pytest.skip(f"the {name} record is not on this machine: set SYMGEN_DATA to a folder that holds {name}/{', '.join(files)}")
+    return paths
+
+
+@pytest.fixture(scope="session")
+def emps_data():
+    """Paths of the EMPS files by name; `fetch` finds them too."""
+    with pytest.MonkeyPatch.context() as patch:
+        yield _provide("emps", patch)
+
+
+@pytest.fixture(scope="session")
+def tx40_data():
+    """Paths of the TX40 files by name; `fetch` finds them too."""
+    with pytest.MonkeyPatch.context() as patch:
+        yield _provide("tx40", patch)

@@ -50,7 +50,11 @@ def joint_overlay(joint: JointComparison, unit: str = "N m") -> Figure:
     with mpl.rc_context(STYLE):
         figure, (axes,) = _figure(1, 1, (5.4, 2.8))
         _overlay(axes, joint, unit)
-        axes.legend(ncols=3, loc="upper left", bbox_to_anchor=(0, 1.2), fontsize=8, handlelength=2.2)
+        axes.set_title("")
+        axes.set_title(_title(joint), fontsize=9, loc="right")
+        axes.legend(
+            ncols=3, loc="lower left", bbox_to_anchor=(-0.02, 1.0), fontsize=8, handlelength=2.0, columnspacing=1.0, borderaxespad=0.2
+        )
     return figure
 
 
@@ -139,9 +143,13 @@ def _overlay(ax: Axes, joint: JointComparison, unit: str) -> None:
     ax.plot(t, measured, color=BLACK, linewidth=1.5, label="measured")
     ax.plot(t, predicted, color=ORANGE, linewidth=1.0, linestyle=(0, (4, 1)), label="predicted")
     ax.plot(t, error, color=BLUE, linewidth=0.7, label="error")
-    ax.set_title(f"joint {joint.joint}, error {joint.relative_error:.1f} %", fontsize=9)
+    ax.set_title(_title(joint), fontsize=9)
     ax.set_xlabel("time, s")
     ax.set_ylabel(f"torque, {unit}")
+
+
+def _title(joint: JointComparison) -> str:
+    return f"joint {joint.joint}, error {joint.relative_error:.1f} %"
 
 
 def _broken(joint: JointComparison) -> tuple[np.ndarray, ...]:

@@ -208,7 +208,12 @@ def resolution_section(
         Table("%e (21) and, in brackets, %sigma (20)", ("parameter", "%sigma of LS", *header[2:]), errors),
         Table("Residual and verdict", ("reading", *header[2:]), residual),
     ]
-    text = tuple(f"{r.level.label}: {r.message}" for r in result.levels)
+    text = (
+        "Two verdicts stand below. The printed rule asks every parameter that decides, and %e(rho), to stay below 1 % (practically unbiased) and calls "
+        "5 % biased. The chapter's section 4.1.4 calls the residual the best single indicator, as it sees the whole model: the last verdict applies "
+        "the same limits to the increase of its norm alone.",
+        *(f"{r.level.label}: {r.message}" for r in result.levels),
+    )
     return Section(title, text, [image] if image else [], tables)
 
 

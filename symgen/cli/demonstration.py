@@ -43,6 +43,7 @@ class Demonstration:
 
 def demonstrate(model: GeneratedModel, study: Study, record: Record, *, simulated: bool, quick: bool, step: Step) -> Demonstration:
     """Everything the report of the demo shows. step : told what begins."""
+    study = replace(study, cestac=CestacSettings(delta=DELTA, runs=2 if quick else study.cestac.runs))
     step("identification")
     provenance: dict[str, Any] = {"records": [record.name], "simulated": simulated}
     if simulated:
@@ -55,7 +56,6 @@ def demonstrate(model: GeneratedModel, study: Study, record: Record, *, simulate
         columns = None if changed.cestac.columns != "essential" else names
         return cestac(model, record, changed, columns=columns, provenance=provenance)
 
-    study = replace(study, cestac=CestacSettings(delta=DELTA, runs=2 if quick else study.cestac.runs))
     step("encoder resolution")
     main = resolution(study)
     if quick:

@@ -1,0 +1,59 @@
+"""`symgen cestac`: options, exit codes, files."""
+
+import json
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from symgen.cli.cestac import cestac
+
+
+def run(*arguments):
+    app = typer.Typer()
+    app.command()(cestac)
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def test_fine_encoder_is_unbiased(emps_data, tmp_path):
+    result = run("emps", "emps", "--delta", "1e-6", "--runs", 3, "-o", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert "practically unbiased at 1e-06" in result.stdout
+    assert {p.name for p in tmp_path.iterdir()} == {"report.html", "cestac.json", "study.yaml", "resolution.png", "resolution.svg"}
+
+
+def test_coarse_encoder_is_biased(emps_data):
+    result = run("emps", "emps", "--delta", "1e-4", "--delta", "2e-5", "--runs", 2, "--rounding", "uniform", "--seed", 7, "--json")
+    assert result.exit_code == 1
+    found = json.loads(result.stdout)
+    assert [level["level"]["delta"] for level in found["levels"]] == [1e-4, 2e-5]
+    assert found["settings"]["cestac"]["rounding"] == "uniform" and found["provenance"]["seed"] == 7
+    assert {"e_rho", "e_rho_own", "increase"} <= set(found["levels"][0])
+
+
+def test_workers_give_the_same_bits(emps_data):
+    one, two = (json.loads(run("emps", "emps", "--delta", "1e-6", "--runs", 2, "--workers", w, "--json").stdout) for w in (1, 2))
+    assert one["levels"] == two["levels"]
+
+
+def test_torque_steps_and_named_columns(emps_data):
+    result = run("emps", "emps", "--delta", "1e-6", "--torque", "0.01", "--runs", 2, "--columns", "M1R,FV1", "--json")
+    found = json.loads(result.stdout)
+    assert found["names"] == ["M1R", "FV1"] and len(found["levels"]) == 3
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--delta", "foo"], ["cestac.delta", "foo"]),
+        (["--delta", "-1"], ["cestac.delta", "positive"]),
+        (["--runs", "1"], ["cestac.runs", "at least 2"]),
+        (["--rounding", "up"], ["cestac.rounding", "two-point"]),
+        (["--side", "left"], ["cestac.side", "motor"]),
+        (["--columns", "M9"], ["M9", "M1R"]),
+    ],
+)
+def test_bad_options(emps_data, options, words):
+    result = run("emps", "emps", *options)
+    assert result.exit_code == 2
+    assert all(word in result.stderr for word in words), result.stderr

@@ -1,0 +1,134 @@
+"""The demo: labelled as simulated without data; beside the chapter's tables with it (issue of the first milestone, points 9 and 10)."""
+
+import json
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from runtime.io.datasets import dataset_study
+from runtime.io.records import read_records
+from runtime.study import study_from_mapping
+from symgen.cli import chapter_tables, simulated
+from symgen.cli import demo as module
+from symgen.cli.demo_sections import differences
+from symgen.cli.demonstration import demonstrate
+from symgen.cli.session import opened_model
+
+
+def run(*arguments):
+    app = typer.Typer()
+    app.command()(module.demo)
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def offline(tmp_path_factory):
+    """The quick demo where no place holds the record and none can be reached."""
+    folder = tmp_path_factory.mktemp("demo")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("SYMGEN_DATA", raising=False)
+        patch.setattr("runtime.io.datasets.pooch.os_cache", lambda name: folder / "cache")
+        patch.setattr("runtime.io.datasets.pooch.HTTPDownloader", lambda timeout: _refused)
+        yield run("-o", folder / "out", "--quick"), folder / "out"
+
+
+def _refused(url, output_file, pooch):
+    raise OSError("no network in this test")
+
+
+def test_offline_is_labelled_everywhere(offline):
+    result, out = offline
+    assert result.exit_code == 0, result.output
+    assert "SIMULATED" in result.stdout and "No measured record" in result.stderr
+    html = (out / "report.html").read_text(encoding="utf-8")
+    assert "SIMULATED" in html[html.index("<h1>") : html.index("</h1>")] and 'class="warning"' in html
+    for name in ("estimate.json", "cestac.json"):
+        provenance = json.loads((out / name).read_text())["provenance"]
+        assert provenance["simulated"] is True and "SIMULATED" in provenance["note"]
+    study = (out / "study.yaml").read_text()
+    assert "SIMULATED" in study and simulated.FILE in study and (out / simulated.FILE).is_file()
+    assert "http://" not in html and "https://" not in html and "<script" not in html
+
+
+def test_offline_recovers_what_was_put_in(offline):
+    """The large parameters of the robot file, from a noisy record of 4 s."""
+    _, out = offline
+    estimate = json.loads((out / "estimate.json").read_text())
+    found = dict(zip(estimate["names"], estimate["X"], strict=True))
+    for name in ("ZZ1R", "FV1", "MX2R", "FV2", "FS2", "FS3"):
+        assert found[name] == pytest.approx(chapter_tables.TABLE_2[name], rel=0.1)
+
+
+def test_simulated_trajectory_keeps_the_limits():
+    with opened_model("tx40") as model:
+        path = simulated.point_to_point(model, 9.0, seed=1)
+        again = simulated.point_to_point(model, 9.0, seed=1)
+        low, high = np.array(model.LIMITS["q"]).T
+        assert (path.q >= low).all() and (path.q <= high).all()
+        assert (np.abs(path.qd) <= np.array(model.LIMITS["qd"])).all()
+        assert (np.abs(path.qdd) <= np.array(model.LIMITS["qdd"])).all()
+    assert np.array_equal(path.q, again.q)
+    for x, dx in ((path.q, path.qd), (path.qd, path.qdd)):  # central differences at 5 kHz
+        assert np.abs(np.gradient(x, path.t, axis=0) - dx)[1:-1].max() < 5e-3 * np.abs(dx).max()
+    steady = np.abs(path.qdd).max(axis=1) == 0
+    assert 0.2 < steady.mean() < 0.5  # constant velocity in the middle of every piece
+
+
+def test_measured_record(tx40_data):
+    """Points 9 and 10 of the first milestone, and every table of the report; one test, since the demo runs once."""
+    with opened_model("tx40") as model:
+        study = study_from_mapping(dataset_study("tx40"))
+        record = read_records(study.record, model)[0]
+        shown = demonstrate(model, study, record, simulated=False, quick=False, step=lambda text: None)
+    check_table_2(shown)
+    check_table_3(shown)
+    check_coupling(shown)
+    check_slow_rows(shown)
+    check_report(shown)
+
+
+def check_table_2(shown):
+    found = differences(shown)
+    assert shown.found.found.estimate.relative_error < 8
+    assert len(found) == 17
+    assert sum(abs(d) <= 10 for d in found.values()) >= 11
+    assert sum(abs(d) <= 20 for d in found.values()) >= 14
+    assert all(abs(d) <= 40 for d in found.values())
+
+
+def check_table_3(shown):
+    i = shown.resolution.names.index("ZZ1R")
+    assert [level.mean[i] for level in shown.resolution.levels] == pytest.approx(chapter_tables.TABLE_3["ZZ1R"], abs=0.07)
+    assert len(shown.combinations) == 8
+    assert len(shown.torque.levels) == 1 + 2 * len(chapter_tables.PHI)
+
+
+def check_coupling(shown):
+    """Leaving it out ruins joint 5, which the total hides."""
+    error = {key: [joint.relative_error for joint in fit.per_joint] for key, fit in shown.found.coupling.items()}
+    assert set(error) == {"both", "position", "torque", "none"}
+    assert all(error[key][4] > 1.25 * error["both"][4] for key in ("position", "torque", "none"))
+    assert shown.found.coupling["none"].relative_error < shown.found.coupling["both"].relative_error
+
+
+def check_slow_rows(shown):
+    """Why FS5 is 27 % below Table 2: a third of it is the treatment of low speed."""
+    base, slow = (list(shown.variants.values())[k][0] for k in (0, 2))
+    assert slow["FS5"] > base["FS5"] + 0.3 and slow["FV5"] < base["FV5"] - 0.1
+
+
+def check_report(shown):
+    html = module.demo_files(shown, "symgen: 1\n")["report.html"]
+    for words in (
+        "Table 2",
+        "Table 3",
+        "Table 4",
+        "Other choices",
+        "true quantisation",
+        "within 0.07",
+        "Gaussian rounding is called pessimistic",
+    ):
+        assert words in html
+    assert html.count("data:image/svg+xml") >= 8
