@@ -14,7 +14,7 @@ Element     FSP     coulomb, positive motion only: along q1
 Element     FVN     viscous, negative motion only: along q1
 Element     FSN     coulomb, negative motion only: along q1
 
-Base parameters, 5 of 15; Gautier and Khalil (1990), exact
+Base parameters, 5 of 15; Gautier and Khalil (1990), exact over F_p
     M1R = M1 + Ia1
     as they are: FVP1 FSP1 FVN1 FSN1
 No effect: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1
@@ -132,22 +132,30 @@ def observation_matrix(q, qd, qdd, *, out=None, g=9.81):
 
 def inverse_dynamics(q, qd, qdd, X, *, g=9.81):
     """Joint torques Gamma, shape (N, 1), of base parameters X, shape (5,)."""
-    return _by_sample(_fill(_inverse_dynamics_block, np.empty((1, np.size(q) // 1)), (q, qd, qdd), X, g), q)
+    GAM = np.empty((1, np.size(q) // 1))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, g), q)
 
 
 def inertia_matrix(q, X, *, g=9.81):
     """A(q), shape (N, 1, 1), actuators included."""
-    return _by_sample(_fill(_inertia_matrix_block, np.empty((1, 1, np.size(q) // 1)), (q,), X, g), q)
+    A = np.empty((1, 1, np.size(q) // 1))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, g), q)
 
 
 def bias(q, qd, X, *, g=9.81):
     """Gamma at qdd = 0, shape (N, 1): Coriolis, centrifugal, gravity, friction and offset."""
-    return _by_sample(_fill(_bias_block, np.empty((1, np.size(q) // 1)), (q, qd), X, g), q)
+    GAM = np.empty((1, np.size(q) // 1))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, g), q)
 
 
 def gravity(q, X, *, g=9.81):
     """Gamma at rest without friction, shape (N, 1): gravity, offset and springs (a base parameter may mix them)."""
-    return _by_sample(_fill(_gravity_block, np.empty((1, np.size(q) // 1)), (q,), X, g), q)
+    GAM = np.empty((1, np.size(q) // 1))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, g), q)
 
 
 def forward_dynamics(q, qd, tau, X, *, g=9.81):
@@ -160,7 +168,8 @@ def frame_poses(q, *, g=9.81):
     """Homogeneous transform of every frame j in frame 0, shape (N, 1, 4, 4), at index j - 1."""
     T = np.zeros((1, 4, 4, np.size(q) // 1))
     T[:, 3, 3] = 1.0
-    return _by_sample(_fill(_frame_poses_block, T, (q,), g), q)
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, g), q)
 
 
 def jacobian(q, *, frame=1, g=9.81):

@@ -19,7 +19,7 @@ Element     FV      viscous: along q1, q2, q3, q4, q5, q6, q7
 Element     FS      coulomb: along q1, q2, q3, q4, q5, q6, q7
 Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6, q7
 
-Base parameters, 69 of 98; Gautier and Khalil (1990), exact
+Base parameters, 69 of 98; Gautier and Khalil (1990), exact over F_p
     ZZ1R = ZZ1 + Ia1 + YY2
     XX2R = XX2 - YY2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
     ZZ2R = ZZ2 + Ia2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
@@ -248,22 +248,30 @@ def observation_matrix(q, qd, qdd, *, out=None, RL1=0.333, RL3=0.316, D4=0.0825,
 
 def inverse_dynamics(q, qd, qdd, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
     """Joint torques Gamma, shape (N, 7), of base parameters X, shape (69,)."""
-    return _by_sample(_fill(_inverse_dynamics_block, np.empty((7, np.size(q) // 7)), (q, qd, qdd), X, RL1, RL3, D4, RL5, D7, g), q)
+    GAM = np.empty((7, np.size(q) // 7))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, RL1, RL3, D4, RL5, D7, g), q)
 
 
 def inertia_matrix(q, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
     """A(q), shape (N, 7, 7), actuators included."""
-    return _by_sample(_fill(_inertia_matrix_block, np.empty((7, 7, np.size(q) // 7)), (q,), X, RL1, RL3, D4, RL5, D7, g), q)
+    A = np.empty((7, 7, np.size(q) // 7))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, RL1, RL3, D4, RL5, D7, g), q)
 
 
 def bias(q, qd, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
     """Gamma at qdd = 0, shape (N, 7): Coriolis, centrifugal, gravity, friction and offset."""
-    return _by_sample(_fill(_bias_block, np.empty((7, np.size(q) // 7)), (q, qd), X, RL1, RL3, D4, RL5, D7, g), q)
+    GAM = np.empty((7, np.size(q) // 7))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, RL1, RL3, D4, RL5, D7, g), q)
 
 
 def gravity(q, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
     """Gamma at rest without friction, shape (N, 7): gravity, offset and springs (a base parameter may mix them)."""
-    return _by_sample(_fill(_gravity_block, np.empty((7, np.size(q) // 7)), (q,), X, RL1, RL3, D4, RL5, D7, g), q)
+    GAM = np.empty((7, np.size(q) // 7))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, RL1, RL3, D4, RL5, D7, g), q)
 
 
 def forward_dynamics(q, qd, tau, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
@@ -276,7 +284,8 @@ def frame_poses(q, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.
     """Homogeneous transform of every frame j in frame 0, shape (N, 7, 4, 4), at index j - 1."""
     T = np.zeros((7, 4, 4, np.size(q) // 7))
     T[:, 3, 3] = 1.0
-    return _by_sample(_fill(_frame_poses_block, T, (q,), RL1, RL3, D4, RL5, D7, g), q)
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, RL1, RL3, D4, RL5, D7, g), q)
 
 
 def jacobian(q, *, frame=7, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):

@@ -14,7 +14,7 @@ Element     FV      viscous: along q1, q2
 Element     FS      coulomb: along q1, q2
 Element     OFFSET  offset: along q1, q2
 
-Base parameters, 13 of 28; Gautier and Khalil (1990), exact
+Base parameters, 13 of 28; Gautier and Khalil (1990), exact over F_p
     ZZ1R = ZZ1 + Ia1 + D2**2*M2
     MX1R = MX1 + D2*M2
     as they are: MY1 FV1 FS1 OFFSET1 ZZ2 MX2 MY2 Ia2 FV2 FS2 OFFSET2
@@ -145,22 +145,30 @@ def observation_matrix(q, qd, qdd, *, out=None, D2=0.5, g=9.81):
 
 def inverse_dynamics(q, qd, qdd, X, *, D2=0.5, g=9.81):
     """Joint torques Gamma, shape (N, 2), of base parameters X, shape (13,)."""
-    return _by_sample(_fill(_inverse_dynamics_block, np.empty((2, np.size(q) // 2)), (q, qd, qdd), X, D2, g), q)
+    GAM = np.empty((2, np.size(q) // 2))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D2, g), q)
 
 
 def inertia_matrix(q, X, *, D2=0.5, g=9.81):
     """A(q), shape (N, 2, 2), actuators included."""
-    return _by_sample(_fill(_inertia_matrix_block, np.empty((2, 2, np.size(q) // 2)), (q,), X, D2, g), q)
+    A = np.empty((2, 2, np.size(q) // 2))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D2, g), q)
 
 
 def bias(q, qd, X, *, D2=0.5, g=9.81):
     """Gamma at qdd = 0, shape (N, 2): Coriolis, centrifugal, gravity, friction and offset."""
-    return _by_sample(_fill(_bias_block, np.empty((2, np.size(q) // 2)), (q, qd), X, D2, g), q)
+    GAM = np.empty((2, np.size(q) // 2))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, D2, g), q)
 
 
 def gravity(q, X, *, D2=0.5, g=9.81):
     """Gamma at rest without friction, shape (N, 2): gravity, offset and springs (a base parameter may mix them)."""
-    return _by_sample(_fill(_gravity_block, np.empty((2, np.size(q) // 2)), (q,), X, D2, g), q)
+    GAM = np.empty((2, np.size(q) // 2))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, D2, g), q)
 
 
 def forward_dynamics(q, qd, tau, X, *, D2=0.5, g=9.81):
@@ -173,7 +181,8 @@ def frame_poses(q, *, D2=0.5, g=9.81):
     """Homogeneous transform of every frame j in frame 0, shape (N, 2, 4, 4), at index j - 1."""
     T = np.zeros((2, 4, 4, np.size(q) // 2))
     T[:, 3, 3] = 1.0
-    return _by_sample(_fill(_frame_poses_block, T, (q,), D2, g), q)
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, D2, g), q)
 
 
 def jacobian(q, *, frame=2, D2=0.5, g=9.81):

@@ -18,7 +18,7 @@ Element     FV      viscous: along q1, q2, q3, q4, q5, q6
 Element     FS      coulomb: along q1, q2, q3, q4, q5, q6
 Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
 
-Base parameters, 58 of 84; Gautier and Khalil (1990), exact
+Base parameters, 58 of 84; Gautier and Khalil (1990), exact over F_p
     ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + 2*RL2*MZ2 + RL2**2*M2 + (2*RL2 + 2*RL3)*MZ3 + (D3**2 + RL2**2 + 2*RL2*RL3 +
         RL3**2)*M3 + (D3**2 + D4**2 + RL2**2 + 2*RL2*RL3 + RL3**2)*(M4 + M5 + M6)
     XX2R = XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)
@@ -218,22 +218,30 @@ def observation_matrix(q, qd, qdd, *, out=None, RL2=0.2435, D3=0.4318, RL3=-0.09
 
 def inverse_dynamics(q, qd, qdd, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
     """Joint torques Gamma, shape (N, 6), of base parameters X, shape (58,)."""
-    return _by_sample(_fill(_inverse_dynamics_block, np.empty((6, np.size(q) // 6)), (q, qd, qdd), X, RL2, D3, RL3, D4, RL4, g), q)
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, RL2, D3, RL3, D4, RL4, g), q)
 
 
 def inertia_matrix(q, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
     """A(q), shape (N, 6, 6), actuators included."""
-    return _by_sample(_fill(_inertia_matrix_block, np.empty((6, 6, np.size(q) // 6)), (q,), X, RL2, D3, RL3, D4, RL4, g), q)
+    A = np.empty((6, 6, np.size(q) // 6))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, RL2, D3, RL3, D4, RL4, g), q)
 
 
 def bias(q, qd, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
     """Gamma at qdd = 0, shape (N, 6): Coriolis, centrifugal, gravity, friction and offset."""
-    return _by_sample(_fill(_bias_block, np.empty((6, np.size(q) // 6)), (q, qd), X, RL2, D3, RL3, D4, RL4, g), q)
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, RL2, D3, RL3, D4, RL4, g), q)
 
 
 def gravity(q, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
     """Gamma at rest without friction, shape (N, 6): gravity, offset and springs (a base parameter may mix them)."""
-    return _by_sample(_fill(_gravity_block, np.empty((6, np.size(q) // 6)), (q,), X, RL2, D3, RL3, D4, RL4, g), q)
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, RL2, D3, RL3, D4, RL4, g), q)
 
 
 def forward_dynamics(q, qd, tau, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
@@ -246,7 +254,8 @@ def frame_poses(q, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331
     """Homogeneous transform of every frame j in frame 0, shape (N, 6, 4, 4), at index j - 1."""
     T = np.zeros((6, 4, 4, np.size(q) // 6))
     T[:, 3, 3] = 1.0
-    return _by_sample(_fill(_frame_poses_block, T, (q,), RL2, D3, RL3, D4, RL4, g), q)
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, RL2, D3, RL3, D4, RL4, g), q)
 
 
 def jacobian(q, *, frame=6, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):

@@ -16,7 +16,7 @@ Element     FV      viscous: along q1, q2, q3, q4
 Element     FS      coulomb: along q1, q2, q3, q4
 Element     OFFSET  offset: along q1, q2, q3, q4
 
-Base parameters, 22 of 56; Gautier and Khalil (1990), exact
+Base parameters, 22 of 56; Gautier and Khalil (1990), exact over F_p
     ZZ1R = ZZ1 + Ia1 + D2**2*(M2 + M3 - Ia4)
     ZZ2R = ZZ2 + D3**2*(M3 - Ia4)
     MX2R = MX2 + D3*(M3 - Ia4)
@@ -171,22 +171,30 @@ def observation_matrix(q, qd, qdd, *, out=None, D2=0.425, D3=0.375, g=9.81):
 
 def inverse_dynamics(q, qd, qdd, X, *, D2=0.425, D3=0.375, g=9.81):
     """Joint torques Gamma, shape (N, 4), of base parameters X, shape (22,)."""
-    return _by_sample(_fill(_inverse_dynamics_block, np.empty((4, np.size(q) // 4)), (q, qd, qdd), X, D2, D3, g), q)
+    GAM = np.empty((4, np.size(q) // 4))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D2, D3, g), q)
 
 
 def inertia_matrix(q, X, *, D2=0.425, D3=0.375, g=9.81):
     """A(q), shape (N, 4, 4), actuators included."""
-    return _by_sample(_fill(_inertia_matrix_block, np.empty((4, 4, np.size(q) // 4)), (q,), X, D2, D3, g), q)
+    A = np.empty((4, 4, np.size(q) // 4))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D2, D3, g), q)
 
 
 def bias(q, qd, X, *, D2=0.425, D3=0.375, g=9.81):
     """Gamma at qdd = 0, shape (N, 4): Coriolis, centrifugal, gravity, friction and offset."""
-    return _by_sample(_fill(_bias_block, np.empty((4, np.size(q) // 4)), (q, qd), X, D2, D3, g), q)
+    GAM = np.empty((4, np.size(q) // 4))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, D2, D3, g), q)
 
 
 def gravity(q, X, *, D2=0.425, D3=0.375, g=9.81):
     """Gamma at rest without friction, shape (N, 4): gravity, offset and springs (a base parameter may mix them)."""
-    return _by_sample(_fill(_gravity_block, np.empty((4, np.size(q) // 4)), (q,), X, D2, D3, g), q)
+    GAM = np.empty((4, np.size(q) // 4))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, D2, D3, g), q)
 
 
 def forward_dynamics(q, qd, tau, X, *, D2=0.425, D3=0.375, g=9.81):
@@ -199,7 +207,8 @@ def frame_poses(q, *, D2=0.425, D3=0.375, g=9.81):
     """Homogeneous transform of every frame j in frame 0, shape (N, 4, 4, 4), at index j - 1."""
     T = np.zeros((4, 4, 4, np.size(q) // 4))
     T[:, 3, 3] = 1.0
-    return _by_sample(_fill(_frame_poses_block, T, (q,), D2, D3, g), q)
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, D2, D3, g), q)
 
 
 def jacobian(q, *, frame=4, D2=0.425, D3=0.375, g=9.81):

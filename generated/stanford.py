@@ -18,7 +18,7 @@ Element     FV      viscous: along q1, q2, q3, q4, q5, q6
 Element     FS      coulomb: along q1, q2, q3, q4, q5, q6
 Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
 
-Base parameters, 55 of 84; Gautier and Khalil (1990), exact
+Base parameters, 55 of 84; Gautier and Khalil (1990), exact over F_p
     ZZ1R = ZZ1 + Ia1 + YY2 + ZZ3 + 2*RL2*MZ2 + RL2**2*M2
     XX2R = XX2 - YY2 + XX3 - ZZ3 + YY4
     XY2R = XY2 - XZ3
@@ -208,22 +208,30 @@ def observation_matrix(q, qd, qdd, *, out=None, RL1=0.412, RL2=0.154, g=9.81):
 
 def inverse_dynamics(q, qd, qdd, X, *, RL1=0.412, RL2=0.154, g=9.81):
     """Joint torques Gamma, shape (N, 6), of base parameters X, shape (55,)."""
-    return _by_sample(_fill(_inverse_dynamics_block, np.empty((6, np.size(q) // 6)), (q, qd, qdd), X, RL1, RL2, g), q)
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, RL1, RL2, g), q)
 
 
 def inertia_matrix(q, X, *, RL1=0.412, RL2=0.154, g=9.81):
     """A(q), shape (N, 6, 6), actuators included."""
-    return _by_sample(_fill(_inertia_matrix_block, np.empty((6, 6, np.size(q) // 6)), (q,), X, RL1, RL2, g), q)
+    A = np.empty((6, 6, np.size(q) // 6))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, RL1, RL2, g), q)
 
 
 def bias(q, qd, X, *, RL1=0.412, RL2=0.154, g=9.81):
     """Gamma at qdd = 0, shape (N, 6): Coriolis, centrifugal, gravity, friction and offset."""
-    return _by_sample(_fill(_bias_block, np.empty((6, np.size(q) // 6)), (q, qd), X, RL1, RL2, g), q)
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, RL1, RL2, g), q)
 
 
 def gravity(q, X, *, RL1=0.412, RL2=0.154, g=9.81):
     """Gamma at rest without friction, shape (N, 6): gravity, offset and springs (a base parameter may mix them)."""
-    return _by_sample(_fill(_gravity_block, np.empty((6, np.size(q) // 6)), (q,), X, RL1, RL2, g), q)
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, RL1, RL2, g), q)
 
 
 def forward_dynamics(q, qd, tau, X, *, RL1=0.412, RL2=0.154, g=9.81):
@@ -236,7 +244,8 @@ def frame_poses(q, *, RL1=0.412, RL2=0.154, g=9.81):
     """Homogeneous transform of every frame j in frame 0, shape (N, 6, 4, 4), at index j - 1."""
     T = np.zeros((6, 4, 4, np.size(q) // 6))
     T[:, 3, 3] = 1.0
-    return _by_sample(_fill(_frame_poses_block, T, (q,), RL1, RL2, g), q)
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, RL1, RL2, g), q)
 
 
 def jacobian(q, *, frame=6, RL1=0.412, RL2=0.154, g=9.81):

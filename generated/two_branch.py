@@ -20,7 +20,7 @@ Element     FV      viscous: along q1, q2, q3, q4, q6, q7, q8
 Element     FS      coulomb: along q1, q2, q3, q4, q6, q7, q8
 Element     OFFSET  offset: along q1, q2, q3, q4, q6, q7, q8
 
-Base parameters, 67 of 108; Gautier and Khalil (1990), exact
+Base parameters, 67 of 108; Gautier and Khalil (1990), exact over F_p
     ZZ1R = ZZ1 + Ia1 + YY2 + ZZ3 + YY4 + ZZ5 + YY6 + YY7 + 2*RL2*MZ2 + (D2**2 + RL2**2)*M2 + D4**2*M4 + 2*D5*MX5 +
         (D4**2 + D5**2)*M5 + D6**2*M6 + (D6**2 + D7**2)*(M7 + M8)
     MX1R = MX1 - MZ6 - MZ7 + D2*M2
@@ -253,22 +253,30 @@ def observation_matrix(q, qd, qdd, *, out=None, D2=0.21, RL2=0.13, D4=0.17, D5=0
 
 def inverse_dynamics(q, qd, qdd, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
     """Joint torques Gamma, shape (N, 7), of base parameters X, shape (67,)."""
-    return _by_sample(_fill(_inverse_dynamics_block, np.empty((7, np.size(q) // 7)), (q, qd, qdd), X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+    GAM = np.empty((7, np.size(q) // 7))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
 
 
 def inertia_matrix(q, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
     """A(q), shape (N, 7, 7), actuators included."""
-    return _by_sample(_fill(_inertia_matrix_block, np.empty((7, 7, np.size(q) // 7)), (q,), X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+    A = np.empty((7, 7, np.size(q) // 7))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
 
 
 def bias(q, qd, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
     """Gamma at qdd = 0, shape (N, 7): Coriolis, centrifugal, gravity, friction and offset."""
-    return _by_sample(_fill(_bias_block, np.empty((7, np.size(q) // 7)), (q, qd), X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+    GAM = np.empty((7, np.size(q) // 7))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
 
 
 def gravity(q, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
     """Gamma at rest without friction, shape (N, 7): gravity, offset and springs (a base parameter may mix them)."""
-    return _by_sample(_fill(_gravity_block, np.empty((7, np.size(q) // 7)), (q,), X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+    GAM = np.empty((7, np.size(q) // 7))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
 
 
 def forward_dynamics(q, qd, tau, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
@@ -281,7 +289,8 @@ def frame_poses(q, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=
     """Homogeneous transform of every frame j in frame 0, shape (N, 8, 4, 4), at index j - 1."""
     T = np.zeros((8, 4, 4, np.size(q) // 7))
     T[:, 3, 3] = 1.0
-    return _by_sample(_fill(_frame_poses_block, T, (q,), D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
 
 
 def jacobian(q, *, frame=8, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):

@@ -20,7 +20,7 @@ Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
 Element     FVM     viscous: FVM6 in the form 2*q5*q6
 Element     FSM     coulomb: FSM6 along q5 + q6
 
-Base parameters, 60 of 86; Gautier and Khalil (1990), exact
+Base parameters, 60 of 86; Gautier and Khalil (1990), exact over F_p
     ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + D3**2*(M3 + M4 + M5 + M6)
     XX2R = XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)
     XZ2R = XZ2 - D3*MZ3
@@ -244,22 +244,30 @@ def observation_matrix(q, qd, qdd, *, out=None, D3=0.225, RL4=0.225, g=9.81):
 
 def inverse_dynamics(q, qd, qdd, X, *, D3=0.225, RL4=0.225, g=9.81):
     """Joint torques Gamma, shape (N, 6), of base parameters X, shape (60,)."""
-    return _by_sample(_fill(_inverse_dynamics_block, np.empty((6, np.size(q) // 6)), (q, qd, qdd), X, D3, RL4, g), q)
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D3, RL4, g), q)
 
 
 def inertia_matrix(q, X, *, D3=0.225, RL4=0.225, g=9.81):
     """A(q), shape (N, 6, 6), actuators included."""
-    return _by_sample(_fill(_inertia_matrix_block, np.empty((6, 6, np.size(q) // 6)), (q,), X, D3, RL4, g), q)
+    A = np.empty((6, 6, np.size(q) // 6))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D3, RL4, g), q)
 
 
 def bias(q, qd, X, *, D3=0.225, RL4=0.225, g=9.81):
     """Gamma at qdd = 0, shape (N, 6): Coriolis, centrifugal, gravity, friction and offset."""
-    return _by_sample(_fill(_bias_block, np.empty((6, np.size(q) // 6)), (q, qd), X, D3, RL4, g), q)
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, D3, RL4, g), q)
 
 
 def gravity(q, X, *, D3=0.225, RL4=0.225, g=9.81):
     """Gamma at rest without friction, shape (N, 6): gravity, offset and springs (a base parameter may mix them)."""
-    return _by_sample(_fill(_gravity_block, np.empty((6, np.size(q) // 6)), (q,), X, D3, RL4, g), q)
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, D3, RL4, g), q)
 
 
 def forward_dynamics(q, qd, tau, X, *, D3=0.225, RL4=0.225, g=9.81):
@@ -272,7 +280,8 @@ def frame_poses(q, *, D3=0.225, RL4=0.225, g=9.81):
     """Homogeneous transform of every frame j in frame 0, shape (N, 6, 4, 4), at index j - 1."""
     T = np.zeros((6, 4, 4, np.size(q) // 6))
     T[:, 3, 3] = 1.0
-    return _by_sample(_fill(_frame_poses_block, T, (q,), D3, RL4, g), q)
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, D3, RL4, g), q)
 
 
 def jacobian(q, *, frame=6, D3=0.225, RL4=0.225, g=9.81):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from symgen.cli.session import NEGATIVE, opened_model, reported_errors, single_thread, study_and_records, study_text
+from symgen.cli.session import NEGATIVE, opened_model, origin, reported_errors, single_thread, study_and_records, study_text
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
@@ -41,8 +41,7 @@ def cestac(
         study, folder, records = study_and_records(record, model)
         study = changed(study, {key: value for key, value in given.items() if value is not None})
         with progress_bar() as progress:
-            provenance = {"records": [r.name for r in records]}
-            result = study_of_resolution.cestac(model, records, study, workers=workers, progress=progress, provenance=provenance)
+            result = study_of_resolution.cestac(model, records, study, workers=workers, progress=progress, provenance=origin(records))
         if output is not None:
             title = f"{model.NAME}: encoder resolution on {', '.join(r.name for r in records)}"
             write_all(output, resolution_files(result, study_text(study, folder, output), title))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from symgen.cli.session import opened_model, reported_errors, single_thread, study_text
+from symgen.cli.session import SIMULATED_WARNING, opened_model, reported_errors, single_thread, study_text
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def demo(
             typer.echo(
                 f"No measured record: {missing}\nContinuing on a SIMULATED record made on the spot; nothing below was measured.\n", err=True
             )
-        shown = demonstrate(model, study, record, simulated=bool(missing), quick=quick, step=lambda text: typer.echo(f"  {text}", err=True))
+        shown = demonstrate(model, study, record, quick=quick, step=lambda text: typer.echo(f"  {text}", err=True))
         write_all(output, {**demo_files(shown, study_text(shown.found.study, output, output)), **extra})
         typer.echo(verdict(shown))
         typer.echo(f"report: {output / 'report.html'}")
@@ -104,10 +104,7 @@ def demo_files(shown: Demonstration, study: str) -> dict[str, str | bytes]:
         title=f"{shown.found.model.NAME}: identification and encoder resolution, {kind}",
         verdict=verdict(shown),
         sections=[own, *demo_sections(shown), *others, settings],
-        warning="The measured record was not available: everything here was computed on a SIMULATED record, made from the values of the robot file "
-        "with encoder steps and torque noise. No figure in this report was measured."
-        if shown.simulated
-        else "",
+        warning=f"The measured record was not available. {SIMULATED_WARNING}" if shown.simulated else "",
         footer=provenance_line(shown.found),
     )
     curve = plots.error_against_resolution(shown.curve or shown.resolution, ("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5"))

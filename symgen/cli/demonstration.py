@@ -21,6 +21,7 @@ from runtime.observation import observe
 from runtime.record import Record
 from runtime.study import CestacSettings, EstimateSettings, Lowpass, Signals, Study
 from symgen.cli.chapter_tables import DELTA, PHI
+from symgen.cli.session import origin
 
 SWEEP = tuple(2 * pi / counts for counts in (50000, 20000, 10000, 5000, 2000, 1000, 500))  # rad
 FASTER = 100.0  # Hz, the other cut-off
@@ -38,16 +39,18 @@ class Demonstration:
     torque: Cestac | None
     combinations: Mapping[str, Cestac]
     variants: Mapping[str, tuple[Estimate, Estimate]]
-    simulated: bool
+
+    @property
+    def simulated(self) -> bool:
+        """Whether nothing was measured."""
+        return self.found.source == "simulated"
 
 
-def demonstrate(model: GeneratedModel, study: Study, record: Record, *, simulated: bool, quick: bool, step: Step) -> Demonstration:
+def demonstrate(model: GeneratedModel, study: Study, record: Record, *, quick: bool, step: Step) -> Demonstration:
     """Everything the report of the demo shows. step : told what begins."""
     study = replace(study, cestac=CestacSettings(delta=DELTA, runs=2 if quick else study.cestac.runs))
     step("identification")
-    provenance: dict[str, Any] = {"records": [record.name], "simulated": simulated}
-    if simulated:
-        provenance["note"] = "SIMULATED record: nothing was measured"
+    provenance = origin([record])
     found = identification(model, study, [record], provenance=provenance)
     names = found.found.names
 
@@ -59,7 +62,7 @@ def demonstrate(model: GeneratedModel, study: Study, record: Record, *, simulate
     step("encoder resolution")
     main = resolution(study)
     if quick:
-        return Demonstration(found, main, None, None, {}, {}, simulated)
+        return Demonstration(found, main, None, None, {}, {})
     step("curve of %e against resolution")
     curve = resolution(study, delta=SWEEP)
     step("torque resolution")
@@ -69,7 +72,7 @@ def demonstrate(model: GeneratedModel, study: Study, record: Record, *, simulate
         step(label)
         combinations[label] = resolution(changed, **settings)
     step("other treatments of the record")
-    return Demonstration(found, main, curve, torque, combinations, variants(model, study, record), simulated)
+    return Demonstration(found, main, curve, torque, combinations, variants(model, study, record))
 
 
 def _combinations(study: Study, b: int) -> list[tuple[str, Study, dict[str, Any]]]:

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from symgen.cli.session import NEGATIVE, opened_model, reported_errors, single_thread, study_and_records, study_text
+from symgen.cli.session import (
+    NEGATIVE,
+    SIMULATED_WARNING,
+    opened_model,
+    origin,
+    reported_errors,
+    single_thread,
+    study_and_records,
+    study_text,
+)
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
@@ -30,7 +39,7 @@ def identify(
 
         study, folder, records = study_and_records(record, model)
         further = read_records(study.validate.record, model, folder=folder)
-        found = identification(model, study, records, further=further, provenance={"records": [r.name for r in records]})
+        found = identification(model, study, records, further=further, provenance=origin(records))
         if output is not None:
             write_all(output, identification_files(found, study_text(study, folder, output)))
         typer.echo(estimate_json(found) if json else console_text(found), nl=not json)
@@ -70,10 +79,11 @@ def identification_files(found: Identification, study: str) -> dict[str, str | b
     from runtime.report.sections import identification_sections, parameters_csv, torque_unit
 
     unit = torque_unit(found)
-    overlay, residuals = plots.torque_overlay(found.comparison, unit), plots.residual_histogram(found.comparison, unit)
+    overlay, residuals = plots.torque_overlay(found.comparison, unit, found.source), plots.residual_histogram(found.comparison, unit)
     settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
     page = Page(
         title=f"{found.model.NAME}: identification on {found.name}",
+        warning=SIMULATED_WARNING if found.source == "simulated" else "",
         verdict=found.verdict,
         sections=[*identification_sections(found), settings],
         footer=provenance_line(found),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from io import StringIO
@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from runtime.study import Study
 
 BAD_INPUT, NEGATIVE = 2, 1
+SIMULATED = "SIMULATED"  # first word of the name of a record that was not measured
+SIMULATED_WARNING = (
+    "Everything here was computed on a SIMULATED record, made from the values of the robot file with encoder steps and torque noise. "
+    "No figure in this report was measured."
+)
 
 
 def single_thread() -> None:
@@ -79,6 +84,13 @@ def study_and_records(record: str, model: GeneratedModel) -> tuple[Study, Path, 
     if not study.record:
         raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=record)
     return study, folder, read_records(study.record, model, folder=folder)
+
+
+def origin(records: Sequence[Record]) -> dict[str, Any]:
+    """Provenance of the records: their names, and whether they were simulated."""
+    simulated = any(record.name.startswith(SIMULATED) for record in records)
+    note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
+    return {"records": [record.name for record in records], "simulated": simulated, **note}
 
 
 def study_text(study: Study, folder: Path, destination: Path) -> str:

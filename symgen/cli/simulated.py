@@ -20,10 +20,10 @@ import numpy as np
 from runtime.drives import Drives
 from runtime.model import GeneratedModel, require
 from runtime.study import Columns, RecordSettings
+from symgen.cli.session import SIMULATED
 
 Array = np.ndarray
 
-NAME = "SIMULATED"
 FILE = "simulated_record.csv.gz"
 RATE = 5000.0  # Hz, as the public TX40 record
 ENCODER = 2 * pi / 65536  # rad on the motor
@@ -43,7 +43,10 @@ class Trajectory:
 
 
 def point_to_point(model: GeneratedModel, duration: float, seed: int, rate: float = RATE) -> Trajectory:
-    """All joints move together between random points of the middle of their range, as fast as speed and acceleration limits allow."""
+    """All joints move together between random points of the middle of their range, as fast as speed and acceleration limits allow.
+
+    The record ends with the last piece that `duration`, s, has room for.
+    """
     rng = np.random.default_rng(seed)
     low, high = np.array(model.LIMITS["q"], dtype=float).T
     centre, reach = (low + high) / 2, 0.35 * (high - low)
@@ -57,11 +60,14 @@ def point_to_point(model: GeneratedModel, duration: float, seed: int, rate: floa
         way = there - here
         # velocity way/(T (1 - RAMP)); a ramp 3 x**2 - 2 x**3 has the largest slope 1.5
         T = max(np.max(np.abs(way) / speed) / (1 - RAMP), np.sqrt(np.max(np.abs(way) / acceleration) * 1.5 / (RAMP * (1 - RAMP))))
+        if start and start + T > duration:
+            break
         piece = (t >= start) & (t < start + T)
         s, v, a = _unit_piece((t[piece] - start) / T)
         q[piece], qd[piece], qdd[piece] = here + s[:, None] * way, v[:, None] * way / T, a[:, None] * way / T**2
         start, here = start + T, there
-    return Trajectory(t, q, qd, qdd)
+    moved = t < start
+    return Trajectory(t[moved], q[moved], qd[moved], qdd[moved])
 
 
 def motor_record(model: GeneratedModel, duration: float, seed: int) -> tuple[bytes, RecordSettings]:
@@ -80,7 +86,9 @@ def motor_record(model: GeneratedModel, duration: float, seed: int) -> tuple[byt
     stream = BytesIO()
     np.savetxt(stream, np.column_stack([qm, command]), fmt="%.7g", delimiter=",", header=",".join((*q_names, *tau_names)), comments="")
     side: Literal["motor", "joint"] = "motor" if model.DRIVES is not None else "joint"
-    settings = RecordSettings(files=(FILE,), columns=Columns(None, q_names, tau_names), side=side, rate=RATE, name=f"{NAME} {model.NAME}")
+    settings = RecordSettings(
+        files=(FILE,), columns=Columns(None, q_names, tau_names), side=side, rate=RATE, name=f"{SIMULATED} {model.NAME}"
+    )
     return gzip.compress(stream.getvalue(), compresslevel=1, mtime=0), settings
 
 

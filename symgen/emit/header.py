@@ -28,7 +28,7 @@ def header(spec: ModuleSpec) -> list[str]:
         *(f"Element     {line}" for line in element_lines(robot)),
         *(f"Loop        {line}" for line in loop_lines(robot)),
         "",
-        f"Base parameters, {len(regrouping)} of {len(robot.parameters)}; Gautier and Khalil (1990), exact",
+        f"Base parameters, {len(regrouping)} of {len(robot.parameters)}; Gautier and Khalil (1990), {regrouping.method}",
     ]
     alone = [b.name for b in regrouping.base if b.name == b.own]
     for b in regrouping.base:

@@ -1,0 +1,836 @@
+"""Planar five-bar linkage, 2 actuated joints, general closed loop: base parameters, regressor, dynamics.
+
+GENERATED from five_bar.yaml, sha256 2b4cc8e44743, by symgen 0.1.0. Do not edit; symgen generate five_bar
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+    j  ant  mu  sigma  alpha   d  theta  r
+    1    0   1      0      0   0     q1  0
+    2    1   0      0      0  L1     q2  0
+    3    0   1      0      0  L0     q3  0
+    4    3   0      0      0  L3     q4  0
+    5    2   0      0      0  L2     q5  0
+    6    4   0      2      0  L4      0  0
+Gravity     acceleration (0, -g, 0) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1, q3
+Element     FV      viscous: along q1, q3
+Element     FS      coulomb: along q1, q3
+Element     OFFSET  offset: along q1, q3
+Loop        frame 6 coincides with cut frame 5
+Loop        q2, q4, q5 from the closure equations by Newton; assembly mode of q1 = 2.2, q3 = 0.9, q2 = -1.464, q4 = 1.489, q5 = 1.653
+
+Base parameters, 17 of 48; Gautier and Khalil (1990), recognised from 60-digit sampling
+    ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4
+    MX1R = MX1 + L1*M2 + L1/L4*MX4
+    ZZ2R = ZZ2 + L2**2/L4*MX4
+    MX2R = MX2 + L2/L4*MX4
+    ZZ3R = ZZ3 + Ia3 - L3**2/L4*MX4 + L3**2*M4
+    MX3R = MX3 - L3/L4*MX4 + L3*M4
+    ZZ4R = ZZ4 - L4*MX4
+    as they are: MY1 FV1 FS1 OFFSET1 MY2 MY3 FV3 FS3 OFFSET3 MY4
+No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3 XX4 XY4 XZ4 YY4 YZ4 MZ4
+
+Cost per sample
+    regressor         38 multiplications, 22 additions, 4 sin, 4 cos
+    inverse_dynamics  49 multiplications, 36 additions, 4 sin, 4 cos
+    inertia_matrix    27 multiplications, 17 additions, 2 sin, 1 cos
+    bias              45 multiplications, 30 additions, 4 sin, 4 cos
+    gravity           21 multiplications, 14 additions, 4 sin, 4 cos
+    frame_poses       8 multiplications, 8 additions, 5 sin, 5 cos
+    closure           14 multiplications, 13 additions, 5 sin, 5 cos
+    curvature         37 multiplications, 17 additions, 5 sin, 5 cos
+"""
+
+import numpy as np
+
+SCHEMA = 1
+NAME = 'five_bar'
+SOURCE_SHA256 = '2b4cc8e4474326a906119102db0f1bf535a90a4786fa82f82d634d09856e3304'
+JOINTS = (1, 3)
+PASSIVE = (2, 4, 5)
+CONSTANTS = {'L0': 0.2, 'L1': 0.25, 'L2': 0.36, 'L3': 0.27, 'L4': 0.34, 'g': 9.81}
+BASE_PARAMETERS = (
+    'ZZ1R', 'MX1R', 'MY1', 'FV1', 'FS1', 'OFFSET1', 'ZZ2R', 'MX2R', 'MY2', 'ZZ3R', 'MX3R', 'MY3', 'FV3', 'FS3',
+    'OFFSET3', 'ZZ4R', 'MY4',
+)
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'XX3', 'XY3', 'XZ3', 'YY3', 'YZ3', 'ZZ3', 'MX3', 'MY3',
+    'MZ3', 'M3', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4', 'MX4', 'MY4', 'MZ4', 'M4',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'MX1R': 'kg*m', 'MY1': 'kg*m', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m',
+    'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m', 'MY2': 'kg*m', 'ZZ3R': 'kg*m**2', 'MX3R': 'kg*m', 'MY3': 'kg*m',
+    'FV3': 'N*m*s/rad', 'FS3': 'N*m', 'OFFSET3': 'N*m', 'ZZ4R': 'kg*m**2', 'MY4': 'kg*m',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4', 'MX1R': 'MX1 + L1*M2 + L1/L4*MX4', 'MY1': 'MY1', 'FV1': 'FV1',
+    'FS1': 'FS1', 'OFFSET1': 'OFFSET1', 'ZZ2R': 'ZZ2 + L2**2/L4*MX4', 'MX2R': 'MX2 + L2/L4*MX4', 'MY2': 'MY2',
+    'ZZ3R': 'ZZ3 + Ia3 - L3**2/L4*MX4 + L3**2*M4', 'MX3R': 'MX3 - L3/L4*MX4 + L3*M4', 'MY3': 'MY3', 'FV3': 'FV3',
+    'FS3': 'FS3', 'OFFSET3': 'OFFSET3', 'ZZ4R': 'ZZ4 - L4*MX4', 'MY4': 'MY4',
+}
+NO_EFFECT = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MZ1', 'M1', 'XX2', 'XY2', 'XZ2', 'YY2', 'YZ2', 'MZ2', 'XX3', 'XY3', 'XZ3',
+    'YY3', 'YZ3', 'MZ3', 'M3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'MZ4',
+)
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x.", "x.", "x.", "x.", "x.", "x.", "xx", "xx", "xx", ".x", ".x", ".x", ".x", ".x", ".x", "xx", "xx",
+)])
+DRIVES = None
+LIMITS = {}
+VALUES = {}
+_PATHS = {
+    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),))), 3: ((3, 0, ((1, 1.0),)),),
+    4: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))), 5: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)), (5, 0, ((4, 1.0),))),
+    6: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))),
+}
+_START = (2.2, 0.9, -1.4637535910825177, 1.4891269023374534, 1.652880493419971)
+
+
+class Store(np.ndarray):
+    """Room for a regressor, made by `store`; views and copies of one are no stores."""
+
+    ready = False
+
+    def __array_finalize__(self, parent):
+        self.ready = False
+
+
+def store(N):
+    """Room for N samples, shape (17, 2, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
+    S = np.zeros((17, 2, N)).view(Store)
+    S[5, 0] = 1.0
+    S[14, 1] = 1.0
+    S.ready = True
+    return S
+
+
+def _fill(block, result, states, *arguments):
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
+    N = len(states[0])
+    B = max(N, 1) if N <= 8192 else 4096
+    for t in range(0, N, B):
+        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+    return result
+
+
+def _filled_store(q, qd, qdd, out, *constants):
+    N = np.size(q) // 2
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (17, 2, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(17, 2, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    return _fill(_regressor_block, out.view(np.ndarray), _closed(q, qd, qdd, *constants), *constants)
+
+
+def _by_sample(result, q):
+    """Samples first; for a single state (n,) without them."""
+    result = np.moveaxis(result, -1, 0)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def base_parameters(standard, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """X, shape (17,), from the 48 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4, XY4, XZ4, YY4, YZ4, ZZ4,
+        MX4, MY4, MZ4, M4
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4
+    MX1R = MX1 + L1*M2 + L1/L4*MX4
+    ZZ2R = ZZ2 + L2**2/L4*MX4
+    MX2R = MX2 + L2/L4*MX4
+    ZZ3R = ZZ3 + Ia3 - L3**2/L4*MX4 + L3**2*M4
+    MX3R = MX3 - L3/L4*MX4 + L3*M4
+    ZZ4R = ZZ4 - L4*MX4
+    return np.array([
+        ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3, ZZ4R, MY4,
+    ])
+
+
+def regressor(q, qd, qdd, *, out=None, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """D of Gamma = D X, shape (N, 2, 17); q, qd, qdd of shape (N, 2) or (2,), rad or m and seconds.
+
+    A view on one store of shape (17, 2, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
+    faults, up to several times the arithmetic for large N.
+    """
+    S = _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g)
+    D = S.transpose(2, 1, 0)
+    return D[0] if np.ndim(q) == 1 else D
+
+
+def observation_matrix(q, qd, qdd, *, out=None, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """W of Y = W X + rho, shape (2*N, 17), Fortran order, rows joint-major: the same store, no copy."""
+    return _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g).reshape(17, -1).T
+
+
+def inverse_dynamics(q, qd, qdd, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """Joint torques Gamma, shape (N, 2), of base parameters X, shape (17,)."""
+    GAM = np.empty((2, np.size(q) // 2))
+    states = _closed(q, qd, qdd, L0, L1, L2, L3, L4, g)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, L0, L1, L2, L3, L4, g), q)
+
+
+def inertia_matrix(q, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """A(q), shape (N, 2, 2), actuators included."""
+    A = np.empty((2, 2, np.size(q) // 2))
+    states = _closed(q, None, None, L0, L1, L2, L3, L4, g)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, L0, L1, L2, L3, L4, g), q)
+
+
+def bias(q, qd, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """Gamma at qdd = 0, shape (N, 2): Coriolis, centrifugal, gravity, friction and offset."""
+    GAM = np.empty((2, np.size(q) // 2))
+    states = _closed(q, qd, None, L0, L1, L2, L3, L4, g)
+    return _by_sample(_fill(_bias_block, GAM, states, X, L0, L1, L2, L3, L4, g), q)
+
+
+def gravity(q, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """Gamma at rest without friction, shape (N, 2): gravity, offset and springs (a base parameter may mix them)."""
+    GAM = np.empty((2, np.size(q) // 2))
+    states = _closed(q, None, None, L0, L1, L2, L3, L4, g)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, L0, L1, L2, L3, L4, g), q)
+
+
+def forward_dynamics(q, qd, tau, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """qdd = A(q)**-1 (tau - bias), shape (N, 2)."""
+    A, H = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g), bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
+    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """Homogeneous transform of every frame j in frame 0, shape (N, 6, 4, 4), at index j - 1."""
+    T = np.zeros((6, 4, 4, np.size(q) // 2))
+    T[:, 3, 3] = 1.0
+    states = _closed(q, None, None, L0, L1, L2, L3, L4, g)
+    return _by_sample(_fill(_frame_poses_block, T, states, L0, L1, L2, L3, L4, g), q)
+
+
+def jacobian(q, *, frame=6, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """J, shape (N, 6, 2): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g).reshape(-1, 6, 4, 4)
+    J = np.zeros((len(T), 6, 5))
+    P = T[:, (6 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[6 if frame is None else frame]:
+        z = T[:, j - 1, :3, 2]
+        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
+        for k, rate in rates:
+            J[:, :3, k] += rate * v
+            J[:, 3:, k] += rate * w
+    G = _closed(q, None, None, L0, L1, L2, L3, L4, g)[3].reshape(-1, 3, 2)
+    J = J[..., :2] + J[..., 2:] @ G
+    return J[0] if np.ndim(q) == 1 else J
+
+
+def passive_joints(q, qd=None, qdd=None, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also their accelerations."""
+    rates = np.array([
+        [0, 0, 1, 0, 0],
+        [0, 0, 0, 1, 0],
+        [0, 0, 0, 0, 1],
+    ], dtype=float)
+    offsets = np.array([0, 0, 0], dtype=float)
+    states = [x.reshape(*np.shape(q)[:-1], -1) for x in _closed(q, qd, qdd, L0, L1, L2, L3, L4, g)[:3]]
+    found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
+    found[0] += offsets
+    return found[0] if len(found) == 1 else tuple(found)
+
+
+def _closed(q, qd, qdd, *constants):
+    """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 5), and G (N, 3*2), rates of the tied ones."""
+    q = np.atleast_2d(np.asarray(q, dtype=float))
+    N = len(q)
+    qd = np.zeros_like(q) if qd is None else np.atleast_2d(np.asarray(qd, dtype=float))
+    qdd = np.zeros_like(q) if qdd is None else np.atleast_2d(np.asarray(qdd, dtype=float))
+    q = np.concatenate([q, _assembled(q, *constants)], axis=1)
+    J = _fill(_closure_block, np.empty((3, 6, N)), (q,), *constants)[:, 1:].transpose(2, 0, 1)
+    J_a, J_u = J[..., :2], J[..., 2:]
+    volume = np.abs(np.linalg.det(J_u)) / np.prod(np.linalg.norm(J, axis=2), axis=1)
+    if N and volume.min() < 1e-9:
+        t = int(volume.argmin())
+        raise ValueError(f"singular configuration at sample {t}: q = {q[t, :2]}, tied joints {q[t, 2:]} move freely there")
+    G = -np.linalg.solve(J_u, J_a)
+    qd = np.concatenate([qd, np.einsum("tui,ti->tu", G, qd)], axis=1)
+    B = _fill(_curvature_block, np.empty((3, N)), (q, qd), *constants).T
+    qdd = np.concatenate([qdd, np.einsum("tui,ti->tu", G, qdd) - np.linalg.solve(J_u, B[..., None])[..., 0]], axis=1)
+    return q, qd, qdd, G.reshape(N, -1)
+
+
+def _assembled(q, *constants):
+    """Tied joints (N, 3) that close the loops, in the assembly mode of _START and continuous in q.
+
+    Along a smooth record only knots are followed from _START; the samples between them start from interpolation.
+    """
+    N = len(q)
+    pace = np.abs(np.diff(q, axis=0)).max(initial=0.0)
+    every = int(np.clip(0.1 / max(pace, 1e-12), 1, 64)) if N > 64 else 1
+    knots = np.unique(np.append(np.arange(0, N, every), N - 1)) if N else np.arange(0)
+    start, x = np.array(_START[:2]), np.tile(_START[2:], (len(knots), 1))
+    steps = int(np.ceil(np.abs(q[knots] - start).max(initial=0.0) / 0.3))
+    for s in range(1, steps):
+        x, _ = _newton(start + s / steps * (q[knots] - start), x, 2, *constants)
+    x, residual = _newton(q[knots], x, 20, *constants)
+    if every > 1:
+        x = np.stack([np.interp(np.arange(N), knots, column) for column in x.T], axis=1)
+        x, residual = _newton(q, x, 5, *constants)
+    if N and not residual.max() < 1e-10:
+        t = int(np.argmax(np.where(np.isnan(residual), np.inf, residual)))
+        raise ValueError(f"the mechanism does not close at sample {knots[t] if every == 1 else t}: residual {residual[t]:.3g} at q = {q[t]}")
+    return x
+
+
+def _newton(q, x, passes, *constants):
+    """At most `passes` Newton steps on the tied joints x; returns x and the largest residual of each sample."""
+    for k in range(passes + 1):
+        R = _fill(_closure_block, np.empty((3, 6, len(q))), (np.concatenate([q, x], axis=1),), *constants)
+        residual = np.abs(R[:, 0]).max(axis=0)
+        if k == passes or not residual.max(initial=0.0) > 1e-13:
+            return x, residual
+        J = R[:, 3:].transpose(2, 0, 1)
+        J = J + 1e-14 * np.eye(3)  # a singular sample ends as one that does not close
+        x = x - np.clip(np.linalg.solve(J, R[:, 0].T[..., None])[..., 0], -0.5, 0.5)
+
+
+def _regressor_block(q, qd, qdd, G, D, L0, L1, L2, L3, L4, g):
+    """Fill D, shape (17, 2, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (5, N); G: (3*2, N)."""
+    # Inputs
+    q1 = q[0]
+    q3 = q[1]
+    q2 = q[2]
+    q4 = q[3]
+    QP1 = qd[0]
+    QP3 = qd[1]
+    QP2 = qd[2]
+    QP4 = qd[3]
+    QDP1 = qdd[0]
+    QDP3 = qdd[1]
+    QDP2 = qdd[2]
+    QDP4 = qdd[3]
+    G21 = G[0]
+    G23 = G[1]
+    G41 = G[2]
+    G43 = G[3]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    # Link 1
+    DV331 = QP1**2
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    W32 = QP1 + QP2
+    WP32 = QDP1 + QDP2
+    DV332 = W32**2
+    VSP12 = VP11 - L1*DV331
+    VSP22 = VP21 + L1*QDP1
+    VP12 = C2*VSP12 + S2*VSP22
+    VP22 = C2*VSP22 - S2*VSP12
+    # Link 3
+    DV333 = QP3**2
+    VP13 = g*S3
+    VP23 = g*C3
+    # Link 4
+    W34 = QP3 + QP4
+    WP34 = QDP3 + QDP4
+    DV334 = W34**2
+    VSP14 = VP13 - L3*DV333
+    VSP24 = VP23 + L3*QDP3
+    VP14 = C4*VSP14 + S4*VSP24
+    # Joint axes Z and velocities V seen from link 2
+    V121 = L1*S2
+    V221 = L1*C2
+    # Joint axes Z and velocities V seen from link 4
+    V143 = L3*S4
+    V243 = L3*C4
+    # Joint 1
+    D[0, 0] = QDP1                                       # DG1ZZ1
+    D[1, 0] = VP21                                       # DG1MX1
+    D[2, 0] = -VP11                                      # DG1MY1
+    D[3, 0] = QP1                                        # DG1FV1
+    D[4, 0] = np.sign(QP1)                               # DG1FS1
+    D[6, 0] = WP32 + WP32*G21                            # DG1ZZ2
+    D[7, 0] = VP22 + WP32*V221 + VP22*G21 - DV332*V121   # DG1MX2
+    D[8, 0] = -VP12 - WP32*V121 - DV332*V221 - VP12*G21  # DG1MY2
+    D[15, 0] = WP34*G41                                  # DG1ZZ4
+    D[16, 0] = -VP14*G41                                 # DG1MY4
+    # Joint 3
+    D[6, 1] = WP32*G23                                    # DG3ZZ2
+    D[7, 1] = VP22*G23                                    # DG3MX2
+    D[8, 1] = -VP12*G23                                   # DG3MY2
+    D[9, 1] = QDP3                                        # DG3ZZ3
+    D[10, 1] = VP23                                       # DG3MX3
+    D[11, 1] = -VP13                                      # DG3MY3
+    D[12, 1] = QP3                                        # DG3FV3
+    D[13, 1] = np.sign(QP3)                               # DG3FS3
+    D[15, 1] = WP34 + WP34*G43                            # DG3ZZ4
+    D[16, 1] = -VP14 - WP34*V143 - DV334*V243 - VP14*G43  # DG3MY4
+
+
+def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
+    """Fill GAM, shape (2, N). q, qd, qdd: (5, N); G: (3*2, N)."""
+    # Inputs
+    q1 = q[0]
+    q3 = q[1]
+    q2 = q[2]
+    q4 = q[3]
+    QP1 = qd[0]
+    QP3 = qd[1]
+    QP2 = qd[2]
+    QP4 = qd[3]
+    QDP1 = qdd[0]
+    QDP3 = qdd[1]
+    QDP2 = qdd[2]
+    QDP4 = qdd[3]
+    G21 = G[0]
+    G23 = G[1]
+    G41 = G[2]
+    G43 = G[3]
+    ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3, ZZ4R, MY4 = X
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    # Link 1
+    DV331 = QP1**2
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    W32 = QP1 + QP2
+    WP32 = QDP1 + QDP2
+    DV332 = W32**2
+    VSP12 = VP11 - L1*DV331
+    VSP22 = VP21 + L1*QDP1
+    VP12 = C2*VSP12 + S2*VSP22
+    VP22 = C2*VSP22 - S2*VSP12
+    # Link 3
+    DV333 = QP3**2
+    VP13 = g*S3
+    VP23 = g*C3
+    # Link 4
+    W34 = QP3 + QP4
+    WP34 = QDP3 + QDP4
+    DV334 = W34**2
+    VSP14 = VP13 - L3*DV333
+    VSP24 = VP23 + L3*QDP3
+    VP14 = C4*VSP14 + S4*VSP24
+    # Joint 4
+    F14 = -MY4*WP34
+    F24 = -MY4*DV334
+    N34 = ZZ4R*WP34 - MY4*VP14
+    FDI24 = S4*F14 + C4*F24
+    # Joint 3
+    N33 = ZZ3R*QDP3 + MX3R*VP23 - MY3*VP13
+    NE33 = N34 + L3*FDI24 + N33
+    # Joint 2
+    F12 = -MX2R*DV332 - MY2*WP32
+    F22 = MX2R*WP32 - MY2*DV332
+    N32 = ZZ2R*WP32 + MX2R*VP22 - MY2*VP12
+    FDI22 = S2*F12 + C2*F22
+    # Joint 1
+    N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
+    NE31 = N32 + L1*FDI22 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1) + N32*G21 + N34*G41
+    GAM[1] = OFFSET3 + NE33 + FV3*QP3 + FS3*np.sign(QP3) + N32*G23 + N34*G43
+
+
+def _inertia_matrix_block(q, qd, qdd, G, A, X, L0, L1, L2, L3, L4, g):
+    """Fill A, shape (2, 2, N): column i is Gamma for a unit acceleration of joint i from rest. q, qd, qdd: (5, N); G: (3*2, N)."""
+    # Inputs
+    q2 = q[2]
+    q4 = q[3]
+    G21 = G[0]
+    G23 = G[1]
+    G41 = G[2]
+    G43 = G[3]
+    ZZ1R = X[0]
+    ZZ2R = X[6]
+    MX2R = X[7]
+    MY2 = X[8]
+    ZZ3R = X[9]
+    ZZ4R = X[15]
+    MY4 = X[16]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    S4 = np.sin(q4)
+    # Link 2
+    WP321 = 1 + G21
+    VP121 = L1*S2
+    VP221 = L1*C2
+    # Joint 4
+    F141 = -MY4*G41
+    N341 = ZZ4R*G41
+    FDI241 = S4*F141
+    NE331 = N341 + L3*FDI241
+    # Joint 2
+    F121 = -MY2*WP321
+    F221 = MX2R*WP321
+    N321 = ZZ2R*WP321 + MX2R*VP221 - MY2*VP121
+    FDI221 = S2*F121 + C2*F221
+    # Joint 1
+    NE311 = ZZ1R + N321 + L1*FDI221
+    # Link 4
+    WP343 = 1 + G43
+    VP143 = L3*S4
+    # Joint 4
+    F143 = -MY4*WP343
+    N343 = ZZ4R*WP343 - MY4*VP143
+    FDI243 = S4*F143
+    # Joint 3
+    NE333 = ZZ3R + N343 + L3*FDI243
+    # Joint 2
+    N323 = ZZ2R*G23
+    # Inertia matrix
+    A[0, 0] = NE311 + G21*N321 + G41*N341
+    A[1, 0] = A[0, 1] = NE331 + N321*G23 + N341*G43
+    A[1, 1] = NE333 + G23*N323 + G43*N343
+
+
+def _bias_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
+    """Fill GAM, shape (2, N), for qdd = 0. q, qd, qdd: (5, N); G: (3*2, N)."""
+    # Inputs
+    q1 = q[0]
+    q3 = q[1]
+    q2 = q[2]
+    q4 = q[3]
+    QP1 = qd[0]
+    QP3 = qd[1]
+    QP2 = qd[2]
+    QP4 = qd[3]
+    QDP2 = qdd[2]
+    QDP4 = qdd[3]
+    G21 = G[0]
+    G23 = G[1]
+    G41 = G[2]
+    G43 = G[3]
+    MX1R = X[1]
+    MY1 = X[2]
+    FV1 = X[3]
+    FS1 = X[4]
+    OFFSET1 = X[5]
+    ZZ2R = X[6]
+    MX2R = X[7]
+    MY2 = X[8]
+    MX3R = X[10]
+    MY3 = X[11]
+    FV3 = X[12]
+    FS3 = X[13]
+    OFFSET3 = X[14]
+    ZZ4R = X[15]
+    MY4 = X[16]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    # Link 1
+    DV331 = QP1**2
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    W32 = QP1 + QP2
+    DV332 = W32**2
+    VSP12 = VP11 - L1*DV331
+    VP12 = C2*VSP12 + S2*VP21
+    VP22 = C2*VP21 - S2*VSP12
+    # Link 3
+    DV333 = QP3**2
+    VP13 = g*S3
+    VP23 = g*C3
+    # Link 4
+    W34 = QP3 + QP4
+    DV334 = W34**2
+    VSP14 = VP13 - L3*DV333
+    VP14 = C4*VSP14 + S4*VP23
+    # Joint 4
+    F14 = -MY4*QDP4
+    F24 = -MY4*DV334
+    N34 = ZZ4R*QDP4 - MY4*VP14
+    FDI24 = S4*F14 + C4*F24
+    # Joint 3
+    N33 = MX3R*VP23 - MY3*VP13
+    NE33 = N34 + L3*FDI24 + N33
+    # Joint 2
+    F12 = -MX2R*DV332 - MY2*QDP2
+    F22 = MX2R*QDP2 - MY2*DV332
+    N32 = ZZ2R*QDP2 + MX2R*VP22 - MY2*VP12
+    FDI22 = S2*F12 + C2*F22
+    # Joint 1
+    N31 = MX1R*VP21 - MY1*VP11
+    NE31 = N32 + L1*FDI22 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1) + N32*G21 + N34*G41
+    GAM[1] = OFFSET3 + NE33 + FV3*QP3 + FS3*np.sign(QP3) + N32*G23 + N34*G43
+
+
+def _gravity_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
+    """Fill GAM, shape (2, N), at rest. q, qd, qdd: (5, N); G: (3*2, N)."""
+    # Inputs
+    q1 = q[0]
+    q3 = q[1]
+    q2 = q[2]
+    q4 = q[3]
+    G21 = G[0]
+    G23 = G[1]
+    G41 = G[2]
+    G43 = G[3]
+    MX1R = X[1]
+    MY1 = X[2]
+    OFFSET1 = X[5]
+    MX2R = X[7]
+    MY2 = X[8]
+    MX3R = X[10]
+    MY3 = X[11]
+    OFFSET3 = X[14]
+    MY4 = X[16]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    # Link 1
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    VP12 = C2*VP11 + S2*VP21
+    VP22 = C2*VP21 - S2*VP11
+    # Link 3
+    VP13 = g*S3
+    VP23 = g*C3
+    # Link 4
+    VP14 = C4*VP13 + S4*VP23
+    # Joint 4
+    N34 = -MY4*VP14
+    # Joint 3
+    N33 = MX3R*VP23 - MY3*VP13
+    NE33 = N34 + N33
+    # Joint 2
+    N32 = MX2R*VP22 - MY2*VP12
+    # Joint 1
+    N31 = MX1R*VP21 - MY1*VP11
+    NE31 = N32 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + N32*G21 + N34*G41
+    GAM[1] = OFFSET3 + NE33 + N32*G23 + N34*G43
+
+
+def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, L4, g):
+    """Fill T, shape (6, 4, 4, N). q, qd, qdd: (5, N); G: (3*2, N)."""
+    # Inputs
+    q1, q3, q2, q4, q5 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    th12 = q1 + q2
+    C12 = np.cos(th12)
+    S12 = np.sin(th12)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    th34 = q3 + q4
+    C34 = np.cos(th34)
+    S34 = np.sin(th34)
+    th125 = th12 + q5
+    C125 = np.cos(th125)
+    S125 = np.sin(th125)
+    # Frame 2
+    P12 = L1*C1
+    P22 = L1*S1
+    # Frame 4
+    P14 = L0 + L3*C3
+    P24 = L3*S3
+    # Frame 5
+    P15 = P12 + L2*C12
+    P25 = P22 + L2*S12
+    # Frame 6
+    P16 = P14 + L4*C34
+    P26 = P24 + L4*S34
+    # Poses
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 0, 2] = 0.0
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 1, 2] = 0.0
+    T[0, 2, 0] = 0.0
+    T[0, 2, 1] = 0.0
+    T[0, 2, 2] = 1.0
+    T[0, 0, 3] = 0.0
+    T[0, 1, 3] = 0.0
+    T[0, 2, 3] = 0.0
+    T[1, 0, 0] = C12
+    T[1, 0, 1] = -S12
+    T[1, 0, 2] = 0.0
+    T[1, 1, 0] = S12
+    T[1, 1, 1] = C12
+    T[1, 1, 2] = 0.0
+    T[1, 2, 0] = 0.0
+    T[1, 2, 1] = 0.0
+    T[1, 2, 2] = 1.0
+    T[1, 0, 3] = P12
+    T[1, 1, 3] = P22
+    T[1, 2, 3] = 0.0
+    T[2, 0, 0] = C3
+    T[2, 0, 1] = -S3
+    T[2, 0, 2] = 0.0
+    T[2, 1, 0] = S3
+    T[2, 1, 1] = C3
+    T[2, 1, 2] = 0.0
+    T[2, 2, 0] = 0.0
+    T[2, 2, 1] = 0.0
+    T[2, 2, 2] = 1.0
+    T[2, 0, 3] = L0
+    T[2, 1, 3] = 0.0
+    T[2, 2, 3] = 0.0
+    T[3, 0, 0] = C34
+    T[3, 0, 1] = -S34
+    T[3, 0, 2] = 0.0
+    T[3, 1, 0] = S34
+    T[3, 1, 1] = C34
+    T[3, 1, 2] = 0.0
+    T[3, 2, 0] = 0.0
+    T[3, 2, 1] = 0.0
+    T[3, 2, 2] = 1.0
+    T[3, 0, 3] = P14
+    T[3, 1, 3] = P24
+    T[3, 2, 3] = 0.0
+    T[4, 0, 0] = C125
+    T[4, 0, 1] = -S125
+    T[4, 0, 2] = 0.0
+    T[4, 1, 0] = S125
+    T[4, 1, 1] = C125
+    T[4, 1, 2] = 0.0
+    T[4, 2, 0] = 0.0
+    T[4, 2, 1] = 0.0
+    T[4, 2, 2] = 1.0
+    T[4, 0, 3] = P15
+    T[4, 1, 3] = P25
+    T[4, 2, 3] = 0.0
+    T[5, 0, 0] = C34
+    T[5, 0, 1] = -S34
+    T[5, 0, 2] = 0.0
+    T[5, 1, 0] = S34
+    T[5, 1, 1] = C34
+    T[5, 1, 2] = 0.0
+    T[5, 2, 0] = 0.0
+    T[5, 2, 1] = 0.0
+    T[5, 2, 2] = 1.0
+    T[5, 0, 3] = P16
+    T[5, 1, 3] = P26
+    T[5, 2, 3] = 0.0
+
+
+def _closure_block(q, R, L0, L1, L2, L3, L4, g):
+    """Fill R, shape (3, 1 + 5, N): closure residuals, then their derivatives by the joints. q: (5, N)."""
+    # Inputs
+    q1, q3, q2, q4, q5 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    th12 = q1 + q2
+    C12 = np.cos(th12)
+    S12 = np.sin(th12)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    th34 = q3 + q4
+    C34 = np.cos(th34)
+    S34 = np.sin(th34)
+    th125 = th12 + q5
+    C125 = np.cos(th125)
+    S125 = np.sin(th125)
+    # Frame 2
+    P12 = L1*C1
+    P22 = L1*S1
+    # Frame 4
+    C3L3 = L3*C3
+    P14 = L0 + C3L3
+    P24 = L3*S3
+    # Frame 5
+    C12L2 = L2*C12
+    P15 = P12 + C12L2
+    S12L2 = L2*S12
+    P25 = P22 + S12L2
+    # Frame 6
+    C34L4 = L4*C34
+    P16 = P14 + C34L4
+    S34L4 = L4*S34
+    P26 = P24 + S34L4
+    # Loop: frame 6 on frame 5
+    C34C125pS34S125x2 = 2*(C34*C125 + S34*S125)
+    # Residuals and their derivatives by the joints
+    R[0, 0] = P15 - P16
+    R[1, 0] = P25 - P26
+    R[2, 0] = 2*(S34*C125 - C34*S125)
+    R[0, 1] = -P25
+    R[0, 2] = P26
+    R[0, 3] = -S12L2
+    R[0, 4] = S34L4
+    R[0, 5] = 0.0
+    R[1, 1] = P15
+    R[1, 2] = -C3L3 - C34L4
+    R[1, 3] = C12L2
+    R[1, 4] = -C34L4
+    R[1, 5] = 0.0
+    R[2, 1] = -C34C125pS34S125x2
+    R[2, 2] = C34C125pS34S125x2
+    R[2, 3] = -C34C125pS34S125x2
+    R[2, 4] = C34C125pS34S125x2
+    R[2, 5] = -C34C125pS34S125x2
+
+
+def _curvature_block(q, qd, B, L0, L1, L2, L3, L4, g):
+    """Fill B, shape (3, N): second derivatives of the residuals at constant rates. q, qd: (5, N)."""
+    # Inputs
+    q1, q3, q2, q4, q5 = q
+    QP1, QP3, QP2, QP4, QP5 = qd
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    th12 = q1 + q2
+    C12 = np.cos(th12)
+    S12 = np.sin(th12)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    th34 = q3 + q4
+    C34 = np.cos(th34)
+    S34 = np.sin(th34)
+    th125 = th12 + q5
+    C125 = np.cos(th125)
+    S125 = np.sin(th125)
+    # Inputs
+    QP1pQP2 = QP1 + QP2
+    QP3pQP4 = QP3 + QP4
+    S34QP3pQP4 = S34*QP3pQP4
+    C34QP3pQP4 = C34*QP3pQP4
+    QP3pQP4C34QP3pQP4 = QP3pQP4*C34QP3pQP4
+    QP3pQP4S34QP3pQP4 = QP3pQP4*S34QP3pQP4
+    QP5pQP1pQP2 = QP5 + QP1pQP2
+    S125QP5pQP1pQP2 = S125*QP5pQP1pQP2
+    C125QP5pQP1pQP2 = C125*QP5pQP1pQP2
+    # Second derivatives at constant rates
+    B[0] = L3*QP3*QP3*C3 + L4*QP3pQP4C34QP3pQP4 - L1*QP1*QP1*C1 - L2*QP1pQP2*C12*QP1pQP2
+    B[1] = L3*QP3*QP3*S3 + L4*QP3pQP4S34QP3pQP4 - L1*QP1*QP1*S1 - L2*QP1pQP2*S12*QP1pQP2
+    B[2] = -2*(S34*QP5pQP1pQP2*C125QP5pQP1pQP2 + QP3pQP4S34QP3pQP4*C125 + 2*C34QP3pQP4*S125QP5pQP1pQP2 - C34*QP5pQP1pQP2*S125QP5pQP1pQP2 - QP3pQP4C34QP3pQP4*S125 - 2*S34QP3pQP4*C125QP5pQP1pQP2)

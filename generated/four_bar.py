@@ -1,0 +1,668 @@
+"""Planar four-bar linkage, 1 actuated joint, general closed loop: base parameters, regressor, dynamics.
+
+GENERATED from four_bar.yaml, sha256 431dceb45593, by symgen 0.1.0. Do not edit; symgen generate four_bar
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+    j  ant  mu  sigma  alpha   d  theta  r
+    1    0   1      0      0   0     q1  0
+    2    1   0      0      0  L1     q2  0
+    3    0   0      0      0  L0     q3  0
+    4    2   0      0      0  L2     q4  0
+    5    3   0      2      0  L3      0  0
+Gravity     acceleration (0, -g, 0) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1
+Element     FV      viscous: along q1
+Element     FS      coulomb: along q1
+Element     OFFSET  offset: along q1
+Loop        frame 5 coincides with cut frame 4
+Loop        q2, q3, q4 from the closure equations by Newton; assembly mode of q1 = 1, q2 = -0.5518, q3 = 1.296, q4 = 0.8475
+
+Base parameters, 11 of 34; Gautier and Khalil (1990), recognised from 60-digit sampling
+    ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L3*MX3
+    MX1R = MX1 + L1*M2 + L1/L3*MX3
+    ZZ2R = ZZ2 + L2**2/L3*MX3
+    MX2R = MX2 + L2/L3*MX3
+    ZZ3R = ZZ3 - L3*MX3
+    as they are: MY1 FV1 FS1 OFFSET1 MY2 MY3
+No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3
+
+Cost per sample
+    regressor         22 multiplications, 13 additions, 3 sin, 2 cos
+    inverse_dynamics  30 multiplications, 21 additions, 3 sin, 2 cos
+    inertia_matrix    13 multiplications, 8 additions, 1 sin, 1 cos
+    bias              28 multiplications, 18 additions, 3 sin, 2 cos
+    gravity           14 multiplications, 8 additions, 3 sin, 2 cos
+    frame_poses       6 multiplications, 5 additions, 4 sin, 4 cos
+    closure           12 multiplications, 9 additions, 4 sin, 4 cos
+    curvature         31 multiplications, 13 additions, 4 sin, 4 cos
+"""
+
+import numpy as np
+
+SCHEMA = 1
+NAME = 'four_bar'
+SOURCE_SHA256 = '431dceb455935922faec0fc6145fbe3981ed273a1bdd0cee6d2a51fd5c50451c'
+JOINTS = (1,)
+PASSIVE = (2, 3, 4)
+CONSTANTS = {'L0': 0.45, 'L1': 0.2, 'L2': 0.5, 'L3': 0.4, 'g': 9.81}
+BASE_PARAMETERS = ('ZZ1R', 'MX1R', 'MY1', 'FV1', 'FS1', 'OFFSET1', 'ZZ2R', 'MX2R', 'MY2', 'ZZ3R', 'MY3')
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'XX3', 'XY3', 'XZ3', 'YY3', 'YZ3', 'ZZ3', 'MX3', 'MY3',
+    'MZ3', 'M3',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'MX1R': 'kg*m', 'MY1': 'kg*m', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m',
+    'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m', 'MY2': 'kg*m', 'ZZ3R': 'kg*m**2', 'MY3': 'kg*m',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + L1**2*M2 + L1**2/L3*MX3', 'MX1R': 'MX1 + L1*M2 + L1/L3*MX3', 'MY1': 'MY1', 'FV1': 'FV1',
+    'FS1': 'FS1', 'OFFSET1': 'OFFSET1', 'ZZ2R': 'ZZ2 + L2**2/L3*MX3', 'MX2R': 'MX2 + L2/L3*MX3', 'MY2': 'MY2',
+    'ZZ3R': 'ZZ3 - L3*MX3', 'MY3': 'MY3',
+}
+NO_EFFECT = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MZ1', 'M1', 'XX2', 'XY2', 'XZ2', 'YY2', 'YZ2', 'MZ2', 'XX3', 'XY3', 'XZ3',
+    'YY3', 'YZ3', 'MZ3', 'M3',
+)
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x", "x", "x", "x", "x", "x", "x", "x", "x", "x", "x",
+)])
+DRIVES = None
+LIMITS = {}
+VALUES = {}
+_PATHS = {
+    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))), 3: ((3, 0, ((2, 1.0),)),),
+    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))), 5: ((3, 0, ((2, 1.0),)),),
+}
+_START = (1.0, -0.5518306301574998, 1.2956336780546933, 0.8474643082121931)
+
+
+class Store(np.ndarray):
+    """Room for a regressor, made by `store`; views and copies of one are no stores."""
+
+    ready = False
+
+    def __array_finalize__(self, parent):
+        self.ready = False
+
+
+def store(N):
+    """Room for N samples, shape (11, 1, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
+    S = np.zeros((11, 1, N)).view(Store)
+    S[5, 0] = 1.0
+    S.ready = True
+    return S
+
+
+def _fill(block, result, states, *arguments):
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
+    N = len(states[0])
+    B = max(N, 1) if N <= 8192 else 4096
+    for t in range(0, N, B):
+        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+    return result
+
+
+def _filled_store(q, qd, qdd, out, *constants):
+    N = np.size(q) // 1
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (11, 1, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(11, 1, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    return _fill(_regressor_block, out.view(np.ndarray), _closed(q, qd, qdd, *constants), *constants)
+
+
+def _by_sample(result, q):
+    """Samples first; for a single state (n,) without them."""
+    result = np.moveaxis(result, -1, 0)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def base_parameters(standard, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """X, shape (11,), from the 34 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L3*MX3
+    MX1R = MX1 + L1*M2 + L1/L3*MX3
+    ZZ2R = ZZ2 + L2**2/L3*MX3
+    MX2R = MX2 + L2/L3*MX3
+    ZZ3R = ZZ3 - L3*MX3
+    return np.array([
+        ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3,
+    ])
+
+
+def regressor(q, qd, qdd, *, out=None, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """D of Gamma = D X, shape (N, 1, 11); q, qd, qdd of shape (N, 1) or (1,), rad or m and seconds.
+
+    A view on one store of shape (11, 1, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
+    faults, up to several times the arithmetic for large N.
+    """
+    S = _filled_store(q, qd, qdd, out, L0, L1, L2, L3, g)
+    D = S.transpose(2, 1, 0)
+    return D[0] if np.ndim(q) == 1 else D
+
+
+def observation_matrix(q, qd, qdd, *, out=None, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """W of Y = W X + rho, shape (1*N, 11), Fortran order, rows joint-major: the same store, no copy."""
+    return _filled_store(q, qd, qdd, out, L0, L1, L2, L3, g).reshape(11, -1).T
+
+
+def inverse_dynamics(q, qd, qdd, X, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """Joint torques Gamma, shape (N, 1), of base parameters X, shape (11,)."""
+    GAM = np.empty((1, np.size(q) // 1))
+    states = _closed(q, qd, qdd, L0, L1, L2, L3, g)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, L0, L1, L2, L3, g), q)
+
+
+def inertia_matrix(q, X, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """A(q), shape (N, 1, 1), actuators included."""
+    A = np.empty((1, 1, np.size(q) // 1))
+    states = _closed(q, None, None, L0, L1, L2, L3, g)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, L0, L1, L2, L3, g), q)
+
+
+def bias(q, qd, X, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """Gamma at qdd = 0, shape (N, 1): Coriolis, centrifugal, gravity, friction and offset."""
+    GAM = np.empty((1, np.size(q) // 1))
+    states = _closed(q, qd, None, L0, L1, L2, L3, g)
+    return _by_sample(_fill(_bias_block, GAM, states, X, L0, L1, L2, L3, g), q)
+
+
+def gravity(q, X, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """Gamma at rest without friction, shape (N, 1): gravity, offset and springs (a base parameter may mix them)."""
+    GAM = np.empty((1, np.size(q) // 1))
+    states = _closed(q, None, None, L0, L1, L2, L3, g)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, L0, L1, L2, L3, g), q)
+
+
+def forward_dynamics(q, qd, tau, X, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """qdd = A(q)**-1 (tau - bias), shape (N, 1)."""
+    A, H = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, g=g), bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
+    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """Homogeneous transform of every frame j in frame 0, shape (N, 5, 4, 4), at index j - 1."""
+    T = np.zeros((5, 4, 4, np.size(q) // 1))
+    T[:, 3, 3] = 1.0
+    states = _closed(q, None, None, L0, L1, L2, L3, g)
+    return _by_sample(_fill(_frame_poses_block, T, states, L0, L1, L2, L3, g), q)
+
+
+def jacobian(q, *, frame=5, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """J, shape (N, 6, 1): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, g=g).reshape(-1, 5, 4, 4)
+    J = np.zeros((len(T), 6, 4))
+    P = T[:, (5 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[5 if frame is None else frame]:
+        z = T[:, j - 1, :3, 2]
+        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
+        for k, rate in rates:
+            J[:, :3, k] += rate * v
+            J[:, 3:, k] += rate * w
+    G = _closed(q, None, None, L0, L1, L2, L3, g)[3].reshape(-1, 3, 1)
+    J = J[..., :1] + J[..., 1:] @ G
+    return J[0] if np.ndim(q) == 1 else J
+
+
+def passive_joints(q, qd=None, qdd=None, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
+    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also their accelerations."""
+    rates = np.array([
+        [0, 1, 0, 0],
+        [0, 0, 1, 0],
+        [0, 0, 0, 1],
+    ], dtype=float)
+    offsets = np.array([0, 0, 0], dtype=float)
+    states = [x.reshape(*np.shape(q)[:-1], -1) for x in _closed(q, qd, qdd, L0, L1, L2, L3, g)[:3]]
+    found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
+    found[0] += offsets
+    return found[0] if len(found) == 1 else tuple(found)
+
+
+def _closed(q, qd, qdd, *constants):
+    """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 4), and G (N, 3*1), rates of the tied ones."""
+    q = np.atleast_2d(np.asarray(q, dtype=float))
+    N = len(q)
+    qd = np.zeros_like(q) if qd is None else np.atleast_2d(np.asarray(qd, dtype=float))
+    qdd = np.zeros_like(q) if qdd is None else np.atleast_2d(np.asarray(qdd, dtype=float))
+    q = np.concatenate([q, _assembled(q, *constants)], axis=1)
+    J = _fill(_closure_block, np.empty((3, 5, N)), (q,), *constants)[:, 1:].transpose(2, 0, 1)
+    J_a, J_u = J[..., :1], J[..., 1:]
+    volume = np.abs(np.linalg.det(J_u)) / np.prod(np.linalg.norm(J, axis=2), axis=1)
+    if N and volume.min() < 1e-9:
+        t = int(volume.argmin())
+        raise ValueError(f"singular configuration at sample {t}: q = {q[t, :1]}, tied joints {q[t, 1:]} move freely there")
+    G = -np.linalg.solve(J_u, J_a)
+    qd = np.concatenate([qd, np.einsum("tui,ti->tu", G, qd)], axis=1)
+    B = _fill(_curvature_block, np.empty((3, N)), (q, qd), *constants).T
+    qdd = np.concatenate([qdd, np.einsum("tui,ti->tu", G, qdd) - np.linalg.solve(J_u, B[..., None])[..., 0]], axis=1)
+    return q, qd, qdd, G.reshape(N, -1)
+
+
+def _assembled(q, *constants):
+    """Tied joints (N, 3) that close the loops, in the assembly mode of _START and continuous in q.
+
+    Along a smooth record only knots are followed from _START; the samples between them start from interpolation.
+    """
+    N = len(q)
+    pace = np.abs(np.diff(q, axis=0)).max(initial=0.0)
+    every = int(np.clip(0.1 / max(pace, 1e-12), 1, 64)) if N > 64 else 1
+    knots = np.unique(np.append(np.arange(0, N, every), N - 1)) if N else np.arange(0)
+    start, x = np.array(_START[:1]), np.tile(_START[1:], (len(knots), 1))
+    steps = int(np.ceil(np.abs(q[knots] - start).max(initial=0.0) / 0.3))
+    for s in range(1, steps):
+        x, _ = _newton(start + s / steps * (q[knots] - start), x, 2, *constants)
+    x, residual = _newton(q[knots], x, 20, *constants)
+    if every > 1:
+        x = np.stack([np.interp(np.arange(N), knots, column) for column in x.T], axis=1)
+        x, residual = _newton(q, x, 5, *constants)
+    if N and not residual.max() < 1e-10:
+        t = int(np.argmax(np.where(np.isnan(residual), np.inf, residual)))
+        raise ValueError(f"the mechanism does not close at sample {knots[t] if every == 1 else t}: residual {residual[t]:.3g} at q = {q[t]}")
+    return x
+
+
+def _newton(q, x, passes, *constants):
+    """At most `passes` Newton steps on the tied joints x; returns x and the largest residual of each sample."""
+    for k in range(passes + 1):
+        R = _fill(_closure_block, np.empty((3, 5, len(q))), (np.concatenate([q, x], axis=1),), *constants)
+        residual = np.abs(R[:, 0]).max(axis=0)
+        if k == passes or not residual.max(initial=0.0) > 1e-13:
+            return x, residual
+        J = R[:, 2:].transpose(2, 0, 1)
+        J = J + 1e-14 * np.eye(3)  # a singular sample ends as one that does not close
+        x = x - np.clip(np.linalg.solve(J, R[:, 0].T[..., None])[..., 0], -0.5, 0.5)
+
+
+def _regressor_block(q, qd, qdd, G, D, L0, L1, L2, L3, g):
+    """Fill D, shape (11, 1, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (4, N); G: (3*1, N)."""
+    # Inputs
+    q1 = q[0]
+    q2 = q[1]
+    q3 = q[2]
+    QP1 = qd[0]
+    QP2 = qd[1]
+    QDP1 = qdd[0]
+    QDP2 = qdd[1]
+    QDP3 = qdd[2]
+    G21 = G[0]
+    G31 = G[1]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    S3 = np.sin(q3)
+    # Link 1
+    DV331 = QP1**2
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    W32 = QP1 + QP2
+    WP32 = QDP1 + QDP2
+    DV332 = W32**2
+    VSP12 = VP11 - L1*DV331
+    VSP22 = VP21 + L1*QDP1
+    VP12 = C2*VSP12 + S2*VSP22
+    VP22 = C2*VSP22 - S2*VSP12
+    # Link 3
+    VP13 = g*S3
+    # Joint axes Z and velocities V seen from link 2
+    V121 = L1*S2
+    V221 = L1*C2
+    # Joint 1
+    D[0, 0] = QDP1                                       # DG1ZZ1
+    D[1, 0] = VP21                                       # DG1MX1
+    D[2, 0] = -VP11                                      # DG1MY1
+    D[3, 0] = QP1                                        # DG1FV1
+    D[4, 0] = np.sign(QP1)                               # DG1FS1
+    D[6, 0] = WP32 + WP32*G21                            # DG1ZZ2
+    D[7, 0] = VP22 + WP32*V221 + VP22*G21 - DV332*V121   # DG1MX2
+    D[8, 0] = -VP12 - WP32*V121 - DV332*V221 - VP12*G21  # DG1MY2
+    D[9, 0] = QDP3*G31                                   # DG1ZZ3
+    D[10, 0] = -VP13*G31                                 # DG1MY3
+
+
+def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, g):
+    """Fill GAM, shape (1, N). q, qd, qdd: (4, N); G: (3*1, N)."""
+    # Inputs
+    q1 = q[0]
+    q2 = q[1]
+    q3 = q[2]
+    QP1 = qd[0]
+    QP2 = qd[1]
+    QDP1 = qdd[0]
+    QDP2 = qdd[1]
+    QDP3 = qdd[2]
+    G21 = G[0]
+    G31 = G[1]
+    ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3 = X
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    S3 = np.sin(q3)
+    # Link 1
+    DV331 = QP1**2
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    W32 = QP1 + QP2
+    WP32 = QDP1 + QDP2
+    DV332 = W32**2
+    VSP12 = VP11 - L1*DV331
+    VSP22 = VP21 + L1*QDP1
+    VP12 = C2*VSP12 + S2*VSP22
+    VP22 = C2*VSP22 - S2*VSP12
+    # Link 3
+    VP13 = g*S3
+    # Joint 3
+    N33 = ZZ3R*QDP3 - MY3*VP13
+    # Joint 2
+    F12 = -MX2R*DV332 - MY2*WP32
+    F22 = MX2R*WP32 - MY2*DV332
+    N32 = ZZ2R*WP32 + MX2R*VP22 - MY2*VP12
+    FDI22 = S2*F12 + C2*F22
+    # Joint 1
+    N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
+    NE31 = N32 + L1*FDI22 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1) + N32*G21 + N33*G31
+
+
+def _inertia_matrix_block(q, qd, qdd, G, A, X, L0, L1, L2, L3, g):
+    """Fill A, shape (1, 1, N): column i is Gamma for a unit acceleration of joint i from rest. q, qd, qdd: (4, N); G: (3*1, N)."""
+    # Inputs
+    q2 = q[1]
+    G21 = G[0]
+    G31 = G[1]
+    ZZ1R = X[0]
+    ZZ2R = X[6]
+    MX2R = X[7]
+    MY2 = X[8]
+    ZZ3R = X[9]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    # Link 2
+    WP321 = 1 + G21
+    VP121 = L1*S2
+    VP221 = L1*C2
+    # Joint 3
+    N331 = ZZ3R*G31
+    # Joint 2
+    F121 = -MY2*WP321
+    F221 = MX2R*WP321
+    N321 = ZZ2R*WP321 + MX2R*VP221 - MY2*VP121
+    FDI221 = S2*F121 + C2*F221
+    # Joint 1
+    NE311 = ZZ1R + N321 + L1*FDI221
+    # Inertia matrix
+    A[0, 0] = NE311 + G21*N321 + G31*N331
+
+
+def _bias_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, g):
+    """Fill GAM, shape (1, N), for qdd = 0. q, qd, qdd: (4, N); G: (3*1, N)."""
+    # Inputs
+    q1 = q[0]
+    q2 = q[1]
+    q3 = q[2]
+    QP1 = qd[0]
+    QP2 = qd[1]
+    QDP2 = qdd[1]
+    QDP3 = qdd[2]
+    G21 = G[0]
+    G31 = G[1]
+    MX1R = X[1]
+    MY1 = X[2]
+    FV1 = X[3]
+    FS1 = X[4]
+    OFFSET1 = X[5]
+    ZZ2R = X[6]
+    MX2R = X[7]
+    MY2 = X[8]
+    ZZ3R = X[9]
+    MY3 = X[10]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    S3 = np.sin(q3)
+    # Link 1
+    DV331 = QP1**2
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    W32 = QP1 + QP2
+    DV332 = W32**2
+    VSP12 = VP11 - L1*DV331
+    VP12 = C2*VSP12 + S2*VP21
+    VP22 = C2*VP21 - S2*VSP12
+    # Link 3
+    VP13 = g*S3
+    # Joint 3
+    N33 = ZZ3R*QDP3 - MY3*VP13
+    # Joint 2
+    F12 = -MX2R*DV332 - MY2*QDP2
+    F22 = MX2R*QDP2 - MY2*DV332
+    N32 = ZZ2R*QDP2 + MX2R*VP22 - MY2*VP12
+    FDI22 = S2*F12 + C2*F22
+    # Joint 1
+    N31 = MX1R*VP21 - MY1*VP11
+    NE31 = N32 + L1*FDI22 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1) + N32*G21 + N33*G31
+
+
+def _gravity_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, g):
+    """Fill GAM, shape (1, N), at rest. q, qd, qdd: (4, N); G: (3*1, N)."""
+    # Inputs
+    q1 = q[0]
+    q2 = q[1]
+    q3 = q[2]
+    G21 = G[0]
+    G31 = G[1]
+    MX1R = X[1]
+    MY1 = X[2]
+    OFFSET1 = X[5]
+    MX2R = X[7]
+    MY2 = X[8]
+    MY3 = X[10]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    S3 = np.sin(q3)
+    # Link 1
+    VP11 = g*S1
+    VP21 = g*C1
+    # Link 2
+    VP12 = C2*VP11 + S2*VP21
+    VP22 = C2*VP21 - S2*VP11
+    # Link 3
+    VP13 = g*S3
+    # Joint 3
+    N33 = -MY3*VP13
+    # Joint 2
+    N32 = MX2R*VP22 - MY2*VP12
+    # Joint 1
+    N31 = MX1R*VP21 - MY1*VP11
+    NE31 = N32 + N31
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + N32*G21 + N33*G31
+
+
+def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, g):
+    """Fill T, shape (5, 4, 4, N). q, qd, qdd: (4, N); G: (3*1, N)."""
+    # Inputs
+    q1, q2, q3, q4 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    th12 = q1 + q2
+    C12 = np.cos(th12)
+    S12 = np.sin(th12)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    th124 = th12 + q4
+    C124 = np.cos(th124)
+    S124 = np.sin(th124)
+    # Frame 2
+    P12 = L1*C1
+    P22 = L1*S1
+    # Frame 4
+    P14 = P12 + L2*C12
+    P24 = P22 + L2*S12
+    # Frame 5
+    P15 = L0 + L3*C3
+    P25 = L3*S3
+    # Poses
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 0, 2] = 0.0
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 1, 2] = 0.0
+    T[0, 2, 0] = 0.0
+    T[0, 2, 1] = 0.0
+    T[0, 2, 2] = 1.0
+    T[0, 0, 3] = 0.0
+    T[0, 1, 3] = 0.0
+    T[0, 2, 3] = 0.0
+    T[1, 0, 0] = C12
+    T[1, 0, 1] = -S12
+    T[1, 0, 2] = 0.0
+    T[1, 1, 0] = S12
+    T[1, 1, 1] = C12
+    T[1, 1, 2] = 0.0
+    T[1, 2, 0] = 0.0
+    T[1, 2, 1] = 0.0
+    T[1, 2, 2] = 1.0
+    T[1, 0, 3] = P12
+    T[1, 1, 3] = P22
+    T[1, 2, 3] = 0.0
+    T[2, 0, 0] = C3
+    T[2, 0, 1] = -S3
+    T[2, 0, 2] = 0.0
+    T[2, 1, 0] = S3
+    T[2, 1, 1] = C3
+    T[2, 1, 2] = 0.0
+    T[2, 2, 0] = 0.0
+    T[2, 2, 1] = 0.0
+    T[2, 2, 2] = 1.0
+    T[2, 0, 3] = L0
+    T[2, 1, 3] = 0.0
+    T[2, 2, 3] = 0.0
+    T[3, 0, 0] = C124
+    T[3, 0, 1] = -S124
+    T[3, 0, 2] = 0.0
+    T[3, 1, 0] = S124
+    T[3, 1, 1] = C124
+    T[3, 1, 2] = 0.0
+    T[3, 2, 0] = 0.0
+    T[3, 2, 1] = 0.0
+    T[3, 2, 2] = 1.0
+    T[3, 0, 3] = P14
+    T[3, 1, 3] = P24
+    T[3, 2, 3] = 0.0
+    T[4, 0, 0] = C3
+    T[4, 0, 1] = -S3
+    T[4, 0, 2] = 0.0
+    T[4, 1, 0] = S3
+    T[4, 1, 1] = C3
+    T[4, 1, 2] = 0.0
+    T[4, 2, 0] = 0.0
+    T[4, 2, 1] = 0.0
+    T[4, 2, 2] = 1.0
+    T[4, 0, 3] = P15
+    T[4, 1, 3] = P25
+    T[4, 2, 3] = 0.0
+
+
+def _closure_block(q, R, L0, L1, L2, L3, g):
+    """Fill R, shape (3, 1 + 4, N): closure residuals, then their derivatives by the joints. q: (4, N)."""
+    # Inputs
+    q1, q2, q3, q4 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    th12 = q1 + q2
+    C12 = np.cos(th12)
+    S12 = np.sin(th12)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    th124 = th12 + q4
+    C124 = np.cos(th124)
+    S124 = np.sin(th124)
+    # Frame 2
+    P12 = L1*C1
+    P22 = L1*S1
+    # Frame 4
+    C12L2 = L2*C12
+    P14 = P12 + C12L2
+    S12L2 = L2*S12
+    P24 = P22 + S12L2
+    # Frame 5
+    C3L3 = L3*C3
+    P15 = L0 + C3L3
+    P25 = L3*S3
+    # Loop: frame 5 on frame 4
+    C3C124pS3S124x2 = 2*(C3*C124 + S3*S124)
+    # Residuals and their derivatives by the joints
+    R[0, 0] = P14 - P15
+    R[1, 0] = P24 - P25
+    R[2, 0] = 2*(S3*C124 - C3*S124)
+    R[0, 1] = -P24
+    R[0, 2] = -S12L2
+    R[0, 3] = P25
+    R[0, 4] = 0.0
+    R[1, 1] = P14
+    R[1, 2] = C12L2
+    R[1, 3] = -C3L3
+    R[1, 4] = 0.0
+    R[2, 1] = -C3C124pS3S124x2
+    R[2, 2] = -C3C124pS3S124x2
+    R[2, 3] = C3C124pS3S124x2
+    R[2, 4] = -C3C124pS3S124x2
+
+
+def _curvature_block(q, qd, B, L0, L1, L2, L3, g):
+    """Fill B, shape (3, N): second derivatives of the residuals at constant rates. q, qd: (4, N)."""
+    # Inputs
+    q1, q2, q3, q4 = q
+    QP1, QP2, QP3, QP4 = qd
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    th12 = q1 + q2
+    C12 = np.cos(th12)
+    S12 = np.sin(th12)
+    C3 = np.cos(q3)
+    S3 = np.sin(q3)
+    th124 = th12 + q4
+    C124 = np.cos(th124)
+    S124 = np.sin(th124)
+    # Inputs
+    QP1pQP2 = QP1 + QP2
+    QP3S3 = QP3*S3
+    QP3C3 = QP3*C3
+    QP3QP3C3 = QP3*QP3C3
+    QP3QP3S3 = QP3*QP3S3
+    QP4pQP1pQP2 = QP4 + QP1pQP2
+    S124QP4pQP1pQP2 = S124*QP4pQP1pQP2
+    C124QP4pQP1pQP2 = C124*QP4pQP1pQP2
+    # Second derivatives at constant rates
+    B[0] = L3*QP3QP3C3 - L1*QP1*QP1*C1 - L2*QP1pQP2*C12*QP1pQP2
+    B[1] = L3*QP3QP3S3 - L1*QP1*QP1*S1 - L2*QP1pQP2*S12*QP1pQP2
+    B[2] = -2*(S3*QP4pQP1pQP2*C124QP4pQP1pQP2 + QP3QP3S3*C124 + 2*QP3C3*S124QP4pQP1pQP2 - C3*QP4pQP1pQP2*S124QP4pQP1pQP2 - QP3QP3C3*S124 - 2*QP3S3*C124QP4pQP1pQP2)

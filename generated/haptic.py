@@ -1,0 +1,1092 @@
+"""Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double parallelogram: base parameters, regressor, dynamics.
+
+GENERATED from haptic.yaml, sha256 421a2d5c3fb8, by symgen 0.1.0. Do not edit; symgen generate haptic
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+    j  ant  mu  sigma  alpha    d  theta  r
+    1    0   1      0      0    0     q1  0
+    2    1   1      0  -pi/2    0     q2  0
+    3    2   0      0      0   D3     q3  0
+    4    3   0      0      0   D4     q4  0
+    5    1   1      0  -pi/2    0     q5  0
+    6    5   0      0      0   D6     q6  0
+    7    6   0      0      0   D3     q7  0
+    8    3   0      2      0  -D6      0  0
+Gravity     acceleration (gx, gy, 0) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1, q2, q5
+Element     FV      viscous: along q1, q2, q4, q5
+Element     FS      coulomb: along q1, q2, q4, q5
+Element     OFFSET  offset: along q1, q2, q5
+Element     FVP     viscous: along q2, q5
+Element     FSP     coulomb: along q2, q5
+Loop        frame 8 coincides with cut frame 7
+Loop        q3 = pi - q2 + q5
+Loop        q4 = c - q5 (declared)
+Loop        q6 = q2 - q5
+Loop        q7 = pi - q2 + q5
+
+Base parameters, 30 of 78; Gautier and Khalil (1990), exact over F_p
+    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + sin(c)**2*XX4 + 2*cos(c)*sin(c)*XY4 + cos(c)**2*YY4 + (D3**2 +
+        D4**2)*M4 + D6**2*M6
+    MY1R = MY1 + MZ2 + MZ3 + MZ4 + MZ5 + MZ6
+    XX2R = XX2 - YY2 + XX6 - YY6 - D3**2*(M3 + M4)
+    XY2R = XY2 + XY6
+    XZ2R = XZ2 + XZ6 - D3*(MZ3 + MZ4)
+    YZ2R = YZ2 + YZ6
+    ZZ2R = ZZ2 + Ia2 + ZZ6 + D3**2*(M3 + M4)
+    MX2R = MX2 + MX6 + D3*(M3 + M4)
+    FV2R = FV2 + FVP2
+    FS2R = FS2 + FSP2
+    XX3R = XX3 - YY3 + XX5 - YY5 - D4**2*M4 - D6**2*M6
+    XY3R = XY3 + XY5
+    XZ3R = XZ3 - XZ5 - D4*MZ4 + D6*MZ6
+    YZ3R = YZ3 - YZ5
+    ZZ3R = ZZ3 + ZZ5 + Ia5 + D4**2*M4 + D6**2*M6
+    MX3R = MX3 + D4*M4 - D6/D3*MX6
+    MX4R = MX4 - sin(c)/cos(c)*MY4
+    MX5R = MX5 - D6/D3*MX6 + D6*M6
+    FV5R = FV5 + FV4 + FVP5
+    FS5R = FS5 + FS4 + FSP5
+    as they are: MX1 FV1 FS1 OFFSET1 MY2 OFFSET2 MY3 MY5 OFFSET5 MY6
+No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 M2 XZ4 YZ4 ZZ4 M5
+
+Cost per sample
+    regressor         101 multiplications, 63 additions, 6 sin, 6 cos
+    inverse_dynamics  141 multiplications, 123 additions, 6 sin, 6 cos
+    inertia_matrix    47 multiplications, 35 additions, 4 sin, 5 cos
+    bias              131 multiplications, 98 additions, 6 sin, 6 cos
+    gravity           46 multiplications, 35 additions, 5 sin, 5 cos
+    frame_poses       21 multiplications, 6 additions, 4 sin, 4 cos
+"""
+
+import numpy as np
+
+SCHEMA = 1
+NAME = 'haptic'
+SOURCE_SHA256 = '421a2d5c3fb81a818cb29eadeef4f409b7312652bee6bfc113c405f22e7ceb67'
+JOINTS = (1, 2, 5)
+PASSIVE = (3, 4, 6, 7)
+CONSTANTS = {'D3': 0.2, 'D4': 0.22, 'D6': 0.1, 'c': 0.0, 'gx': -9.81, 'gy': 0.0}
+BASE_PARAMETERS = (
+    'ZZ1R', 'MX1', 'MY1R', 'FV1', 'FS1', 'OFFSET1', 'XX2R', 'XY2R', 'XZ2R', 'YZ2R', 'ZZ2R', 'MX2R', 'MY2', 'FV2R',
+    'FS2R', 'OFFSET2', 'XX3R', 'XY3R', 'XZ3R', 'YZ3R', 'ZZ3R', 'MX3R', 'MY3', 'MX4R', 'MX5R', 'MY5', 'FV5R', 'FS5R',
+    'OFFSET5', 'MY6',
+)
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
+    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4', 'MX4', 'MY4', 'MZ4', 'M4', 'FV4',
+    'FS4', 'XX5', 'XY5', 'XZ5', 'YY5', 'YZ5', 'ZZ5', 'MX5', 'MY5', 'MZ5', 'M5', 'Ia5', 'FV5', 'FS5', 'OFFSET5', 'XX6',
+    'XY6', 'XZ6', 'YY6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'MZ6', 'M6', 'FVP2', 'FVP5', 'FSP2', 'FSP5',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'MX1': 'kg*m', 'MY1R': 'kg*m', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m',
+    'XX2R': 'kg*m**2', 'XY2R': 'kg*m**2', 'XZ2R': 'kg*m**2', 'YZ2R': 'kg*m**2', 'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m',
+    'MY2': 'kg*m', 'FV2R': 'N*m*s/rad', 'FS2R': 'N*m', 'OFFSET2': 'N*m', 'XX3R': 'kg*m**2', 'XY3R': 'kg*m**2',
+    'XZ3R': 'kg*m**2', 'YZ3R': 'kg*m**2', 'ZZ3R': 'kg*m**2', 'MX3R': 'kg*m', 'MY3': 'kg*m', 'MX4R': 'kg*m',
+    'MX5R': 'kg*m', 'MY5': 'kg*m', 'FV5R': 'N*m*s/rad', 'FS5R': 'N*m', 'OFFSET5': 'N*m', 'MY6': 'kg*m',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + sin(c)**2*XX4 + 2*cos(c)*sin(c)*XY4 + cos(c)**2*YY4 + (D3**2 + D4**2)*M4 + D6**2*M6',
+    'MX1': 'MX1', 'MY1R': 'MY1 + MZ2 + MZ3 + MZ4 + MZ5 + MZ6', 'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1',
+    'XX2R': 'XX2 - YY2 + XX6 - YY6 - D3**2*(M3 + M4)', 'XY2R': 'XY2 + XY6', 'XZ2R': 'XZ2 + XZ6 - D3*(MZ3 + MZ4)',
+    'YZ2R': 'YZ2 + YZ6', 'ZZ2R': 'ZZ2 + Ia2 + ZZ6 + D3**2*(M3 + M4)', 'MX2R': 'MX2 + MX6 + D3*(M3 + M4)', 'MY2': 'MY2',
+    'FV2R': 'FV2 + FVP2', 'FS2R': 'FS2 + FSP2', 'OFFSET2': 'OFFSET2',
+    'XX3R': 'XX3 - YY3 + XX5 - YY5 - D4**2*M4 - D6**2*M6', 'XY3R': 'XY3 + XY5', 'XZ3R': 'XZ3 - XZ5 - D4*MZ4 + D6*MZ6',
+    'YZ3R': 'YZ3 - YZ5', 'ZZ3R': 'ZZ3 + ZZ5 + Ia5 + D4**2*M4 + D6**2*M6', 'MX3R': 'MX3 + D4*M4 - D6/D3*MX6',
+    'MY3': 'MY3', 'MX4R': 'MX4 - sin(c)/cos(c)*MY4', 'MX5R': 'MX5 - D6/D3*MX6 + D6*M6', 'MY5': 'MY5',
+    'FV5R': 'FV5 + FV4 + FVP5', 'FS5R': 'FS5 + FS4 + FSP5', 'OFFSET5': 'OFFSET5', 'MY6': 'MY6',
+}
+NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MZ1', 'M1', 'M2', 'XZ4', 'YZ4', 'ZZ4', 'M5')
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x..", "x..", "x..", "x..", "x..", "x..", "xx.", "xx.", "xx.", "xx.", ".x.", "xx.", "xx.", ".x.", ".x.", ".x.",
+    "x.x", "x.x", "x.x", "x.x", "..x", "xxx", "xxx", "xxx", "x.x", "x.x", "..x", "..x", "..x", "xxx",
+)])
+DRIVES = {  # qm = ratio (q - offset), tau = ratio' (torque_constant * u)
+    'ratio': (
+        (10.0, 0.0, 0.0),
+        (0.0, 10.0, 0.0),
+        (0.0, 0.0, 10.0),
+    ),
+    'offset': (0.0, 0.0, 0.0),
+    'torque_constant': (1.0, 1.0, 1.0),
+}
+LIMITS = {'q': ((-1.0, 1.0), (-1.7, 0.1), (-3.2, -1.5)), 'qd': (6.0, 6.0, 6.0), 'qdd': (60.0, 60.0, 60.0)}
+VALUES = {
+    'XX1': 0.0060936, 'XY1': -2e-07, 'XZ1': 2e-07, 'YY1': 0.007194, 'YZ1': 0.0004387, 'ZZ1': 0.00731594, 'MX1': 1e-05,
+    'MY1': 0.0219355, 'MZ1': -0.026865, 'M1': 1.3432, 'Ia1': 0.0086827, 'FV1': 0.0002, 'FS1': 0.12, 'OFFSET1': 0.0002,
+    'XX2': 0.0005008, 'XY2': 7e-07, 'XZ2': 9.88e-05, 'YY2': 0.009455, 'YZ2': 0.0, 'ZZ2': 0.0094661, 'MX2': -0.0895382,
+    'MY2': 1e-05, 'MZ2': 0.0012839, 'M2': 1.1377, 'Ia2': 0.0054814, 'FV2': 0.0001, 'FS2': 0.09, 'OFFSET2': 0.02,
+    'XX3': 3.156e-05, 'XY3': -1e-06, 'XZ3': -4.23e-05, 'YY3': 0.0034816, 'YZ3': 0.0, 'ZZ3': 0.00348384,
+    'MX3': 0.0279611, 'MY3': 1e-05, 'MZ3': 0.0004654, 'M3': 0.281, 'XX4': 2.74e-05, 'XY4': 0.0, 'XZ4': 0.0,
+    'YY4': 2.74e-05, 'YZ4': 0.0, 'ZZ4': 3.35e-05, 'MX4': -1e-05, 'MY4': 5.69e-05, 'MZ4': 1.08e-05, 'M4': 0.0569,
+    'FV4': 1e-05, 'FS4': 0.005, 'XX5': 0.0004348, 'XY5': 6e-07, 'XZ5': -4.19e-05, 'YY5': 0.0048428, 'YZ5': 0.0,
+    'ZZ5': 0.0048887, 'MX5': 0.0655991, 'MY5': -1e-05, 'MZ5': 0.0003762, 'M5': 0.9757, 'Ia5': 0.0024855, 'FV5': 0.0001,
+    'FS5': 0.085, 'OFFSET5': 0.03, 'XX6': 6.8e-06, 'XY6': -7e-07, 'XZ6': 5.3e-06, 'YY6': 0.0005366, 'YZ6': 0.0,
+    'ZZ6': 0.0005365, 'MX6': 0.0029582, 'MY6': 1e-05, 'MZ6': -7.18e-05, 'M6': 0.0388, 'FVP2': 2e-05, 'FVP5': 2e-05,
+    'FSP2': 0.02, 'FSP5': 0.02,
+}
+_PATHS = {
+    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
+    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0)))),
+    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0))), (4, 0, ((2, -1.0),))),
+    5: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),))),
+    6: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0)))),
+    7: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0))), (7, 0, ((1, -1.0), (2, 1.0)))),
+    8: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0)))),
+}
+
+
+class Store(np.ndarray):
+    """Room for a regressor, made by `store`; views and copies of one are no stores."""
+
+    ready = False
+
+    def __array_finalize__(self, parent):
+        self.ready = False
+
+
+def store(N):
+    """Room for N samples, shape (30, 3, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
+    S = np.zeros((30, 3, N)).view(Store)
+    S[5, 0] = 1.0
+    S[15, 1] = 1.0
+    S[28, 2] = 1.0
+    S.ready = True
+    return S
+
+
+def _fill(block, result, states, *arguments):
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
+    N = len(states[0])
+    B = max(N, 1) if N <= 8192 else 4096
+    for t in range(0, N, B):
+        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+    return result
+
+
+def _filled_store(q, qd, qdd, out, *constants):
+    N = np.size(q) // 3
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (30, 3, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(30, 3, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
+
+
+def _by_sample(result, q):
+    """Samples first; for a single state (n,) without them."""
+    result = np.moveaxis(result, -1, 0)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def base_parameters(standard, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """X, shape (30,), from the 78 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, XX4, XY4, XZ4, YY4, YZ4, ZZ4,
+        MX4, MY4, MZ4, M4, FV4, FS4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6,
+        XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, FVP2, FVP5, FSP2, FSP5
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + np.sin(c)**2*XX4 + 2*np.cos(c)*np.sin(c)*XY4 + np.cos(c)**2*YY4 + (D3**2 + D4**2)*M4 + D6**2*M6
+    MY1R = MY1 + MZ2 + MZ3 + MZ4 + MZ5 + MZ6
+    XX2R = XX2 - YY2 + XX6 - YY6 - D3**2*(M3 + M4)
+    XY2R = XY2 + XY6
+    XZ2R = XZ2 + XZ6 - D3*(MZ3 + MZ4)
+    YZ2R = YZ2 + YZ6
+    ZZ2R = ZZ2 + Ia2 + ZZ6 + D3**2*(M3 + M4)
+    MX2R = MX2 + MX6 + D3*(M3 + M4)
+    FV2R = FV2 + FVP2
+    FS2R = FS2 + FSP2
+    XX3R = XX3 - YY3 + XX5 - YY5 - D4**2*M4 - D6**2*M6
+    XY3R = XY3 + XY5
+    XZ3R = XZ3 - XZ5 - D4*MZ4 + D6*MZ6
+    YZ3R = YZ3 - YZ5
+    ZZ3R = ZZ3 + ZZ5 + Ia5 + D4**2*M4 + D6**2*M6
+    MX3R = MX3 + D4*M4 - D6/D3*MX6
+    MX4R = MX4 - np.sin(c)/np.cos(c)*MY4
+    MX5R = MX5 - D6/D3*MX6 + D6*M6
+    FV5R = FV5 + FV4 + FVP5
+    FS5R = FS5 + FS4 + FSP5
+    return np.array([
+        ZZ1R, MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R, OFFSET2, XX3R, XY3R, XZ3R,
+        YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5, MY6,
+    ])
+
+
+def regressor(q, qd, qdd, *, out=None, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """D of Gamma = D X, shape (N, 3, 30); q, qd, qdd of shape (N, 3) or (3,), rad or m and seconds.
+
+    A view on one store of shape (30, 3, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
+    faults, up to several times the arithmetic for large N.
+    """
+    S = _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy)
+    D = S.transpose(2, 1, 0)
+    return D[0] if np.ndim(q) == 1 else D
+
+
+def observation_matrix(q, qd, qdd, *, out=None, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """W of Y = W X + rho, shape (3*N, 30), Fortran order, rows joint-major: the same store, no copy."""
+    return _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy).reshape(30, -1).T
+
+
+def inverse_dynamics(q, qd, qdd, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """Joint torques Gamma, shape (N, 3), of base parameters X, shape (30,)."""
+    GAM = np.empty((3, np.size(q) // 3))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D3, D4, D6, c, gx, gy), q)
+
+
+def inertia_matrix(q, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """A(q), shape (N, 3, 3), actuators included."""
+    A = np.empty((3, 3, np.size(q) // 3))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D3, D4, D6, c, gx, gy), q)
+
+
+def bias(q, qd, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """Gamma at qdd = 0, shape (N, 3): Coriolis, centrifugal, gravity, friction and offset."""
+    GAM = np.empty((3, np.size(q) // 3))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, D3, D4, D6, c, gx, gy), q)
+
+
+def gravity(q, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """Gamma at rest without friction, shape (N, 3): gravity, offset and springs (a base parameter may mix them)."""
+    GAM = np.empty((3, np.size(q) // 3))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, D3, D4, D6, c, gx, gy), q)
+
+
+def forward_dynamics(q, qd, tau, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """qdd = A(q)**-1 (tau - bias), shape (N, 3)."""
+    A, H = inertia_matrix(q, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy), bias(q, qd, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
+    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """Homogeneous transform of every frame j in frame 0, shape (N, 8, 4, 4), at index j - 1."""
+    T = np.zeros((8, 4, 4, np.size(q) // 3))
+    T[:, 3, 3] = 1.0
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, D3, D4, D6, c, gx, gy), q)
+
+
+def jacobian(q, *, frame=8, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """J, shape (N, 6, 3): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy).reshape(-1, 8, 4, 4)
+    J = np.zeros((len(T), 6, 3))
+    P = T[:, (8 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[8 if frame is None else frame]:
+        z = T[:, j - 1, :3, 2]
+        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
+        for k, rate in rates:
+            J[:, :3, k] += rate * v
+            J[:, 3:, k] += rate * w
+    return J[0] if np.ndim(q) == 1 else J
+
+
+def passive_joints(q, qd=None, qdd=None, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+    """Positions of the joints PASSIVE, shape (N, 4); with qd also their velocities, with qdd also their accelerations."""
+    rates = np.array([
+        [0, -1, 1],
+        [0, 0, -1],
+        [0, 1, -1],
+        [0, -1, 1],
+    ], dtype=float)
+    offsets = np.array([np.pi, c, 0, np.pi], dtype=float)
+    states = [q, qd, qdd]
+    found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
+    found[0] += offsets
+    return found[0] if len(found) == 1 else tuple(found)
+
+
+def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
+    """Fill D, shape (30, 3, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (3, N)."""
+    # Inputs
+    q1, q2, q5 = q
+    QP1, QP2, QP5 = qd
+    QDP1, QDP2, QDP5 = qdd
+    # Constants
+    Z241 = np.cos(c)
+    Z141 = np.sin(c)
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m5 = q2 - q5
+    C2m5 = np.cos(th2m5)
+    S2m5 = np.sin(th2m5)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    th5b = q5 - c
+    C5b = np.cos(th5b)
+    S5b = np.sin(th5b)
+    # Link 1
+    VP11 = -gx*C1 - gy*S1
+    VP21 = gx*S1 - gy*C1
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    U232 = S2*QDP1
+    U132 = -C2*QDP1
+    DV232 = QP2*W22
+    WP12 = DV232 - U232
+    DV132 = QP2*W12
+    WP22 = U132 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U122 = DV122 - QDP2
+    U212 = QDP2 + DV122
+    U222 = -DV112 - DV332
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    VP12 = C2*VP11
+    VP22 = -S2*VP11
+    # Link 3
+    W13 = S5*QP1
+    W23 = C5*QP1
+    U233 = -S5*QDP1
+    U133 = C5*QDP1
+    DV233 = QP5*W23
+    WP13 = DV233 - U233
+    DV133 = QP5*W13
+    WP23 = U133 - DV133
+    DV113 = W13**2
+    DV123 = W13*W23
+    DV223 = W23**2
+    DV333 = QP5**2
+    DW233 = DV223 - DV333
+    DW313 = DV333 - DV113
+    DW123 = DV113 - DV223
+    U113 = -DV223 - DV333
+    U123 = DV123 - QDP5
+    U213 = QDP5 + DV123
+    U223 = -DV113 - DV333
+    U313 = DV133 - WP23
+    U323 = DV233 + WP13
+    VSP13 = VP12 + D3*U112
+    VSP23 = VP22 + D3*U212
+    VSP33 = VP21 + D3*U312
+    VP13 = S2m5*VSP23 - C2m5*VSP13
+    VP23 = -C2m5*VSP23 - S2m5*VSP13
+    # Link 4
+    W14 = Z141*QP1
+    W24 = Z241*QP1
+    WP24 = Z241*QDP1
+    DV124 = W14*W24
+    DV224 = W24**2
+    VSP14 = VP13 + D4*U113
+    VSP24 = VP23 + D4*U213
+    VSP34 = VSP33 + D4*U313
+    VP24 = C5b*VSP24 + S5b*VSP14
+    # Link 5
+    VP15 = C5*VP11
+    VP25 = -S5*VP11
+    # Link 6
+    VSP16 = VP15 + D6*U113
+    VSP26 = VP25 + D6*U213
+    VSP36 = VP21 - D6*U313
+    VP16 = C2m5*VSP16 + S2m5*VSP26
+    # Joint axes Z and velocities V seen from link 3
+    V331 = D3*C2
+    V132 = D3*S2m5
+    V232 = -D3*C2m5
+    # Joint axes Z and velocities V seen from link 4
+    V341 = V331 - D4*C5
+    VS242 = D4 + V232
+    V142 = C5b*V132 - S5b*VS242
+    V242 = C5b*VS242 + S5b*V132
+    V143 = -D4*S5b
+    V243 = D4*C5b
+    # Joint axes Z and velocities V seen from link 6
+    V361 = D6*C5
+    V165 = D6*S2m5
+    V265 = D6*C2m5
+    # Contributions that several joints share
+    DF3MX4 = DV124*V243 - DV224*V143
+    # Joint 1
+    D[0, 0] = QDP1                      # DG1ZZ1
+    D[1, 0] = VP21                      # DG1MX1
+    D[2, 0] = -VP11                     # DG1MY1
+    D[3, 0] = QP1                       # DG1FV1
+    D[4, 0] = np.sign(QP1)              # DG1FS1
+    D[6, 0] = -S2*WP12 - C2*DV132       # DG1XX2
+    D[7, 0] = S2*U312 - C2*U322         # DG1XY2
+    D[8, 0] = -S2*U212 - C2*DW312       # DG1XZ2
+    D[9, 0] = C2*U122 - S2*DW232        # DG1YZ2
+    D[11, 0] = C2*VP21                  # DG1MX2
+    D[12, 0] = -S2*VP21                 # DG1MY2
+    D[16, 0] = S5*WP13 + C5*DV133       # DG1XX3
+    D[17, 0] = C5*U323 - S5*U313        # DG1XY3
+    D[18, 0] = S5*U213 + C5*DW313       # DG1XZ3
+    D[19, 0] = S5*DW233 - C5*U123       # DG1YZ3
+    D[21, 0] = U313*V331 - C5*VSP33     # DG1MX3
+    D[22, 0] = S5*VSP33 + U323*V331     # DG1MY3
+    D[23, 0] = -Z241*VSP34 - WP24*V341  # DG1MX4
+    D[24, 0] = C5*VP21                  # DG1MX5
+    D[25, 0] = -S5*VP21                 # DG1MY5
+    D[29, 0] = U322*V361 - S2*VSP36     # DG1MY6
+    # Joint 2
+    D[6, 1] = -DV122                                           # DG2XX2
+    D[7, 1] = DW122                                            # DG2XY2
+    D[8, 1] = -U232                                            # DG2XZ2
+    D[9, 1] = U132                                             # DG2YZ2
+    D[10, 1] = QDP2                                            # DG2ZZ2
+    D[11, 1] = VP22                                            # DG2MX2
+    D[12, 1] = -VP12                                           # DG2MY2
+    D[13, 1] = QP2                                             # DG2FV2
+    D[14, 1] = np.sign(QP2)                                    # DG2FS2
+    D[21, 1] = U113*V132 + U213*V232                           # DG2MX3
+    D[22, 1] = U123*V132 + U223*V232                           # DG2MY3
+    D[23, 1] = VP24 + DV124*V242 - DV224*V142 - VP24 - DF3MX4  # DG2MX4
+    D[29, 1] = -VP16                                           # DG2MY6
+    # Joint 5
+    D[16, 2] = -DV123                 # DG5XX3
+    D[17, 2] = DW123                  # DG5XY3
+    D[18, 2] = -U233                  # DG5XZ3
+    D[19, 2] = U133                   # DG5YZ3
+    D[20, 2] = QDP5                   # DG5ZZ3
+    D[21, 2] = VP23                   # DG5MX3
+    D[22, 2] = -VP13                  # DG5MY3
+    D[23, 2] = DF3MX4                 # DG5MX4
+    D[24, 2] = VP25                   # DG5MX5
+    D[25, 2] = -VP15                  # DG5MY5
+    D[26, 2] = QP5                    # DG5FV5
+    D[27, 2] = np.sign(QP5)           # DG5FS5
+    D[29, 2] = U122*V165 + U222*V265  # DG5MY6
+
+
+def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
+    """Fill GAM, shape (3, N). q, qd, qdd: (3, N)."""
+    # Inputs
+    q1, q2, q5 = q
+    QP1, QP2, QP5 = qd
+    QDP1, QDP2, QDP5 = qdd
+    (
+        ZZ1R, MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R, OFFSET2, XX3R, XY3R,
+        XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5, MY6
+    ) = X
+    # Constants
+    cosc = np.cos(c)
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m5 = q2 - q5
+    C2m5 = np.cos(th2m5)
+    S2m5 = np.sin(th2m5)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    th5b = q5 - c
+    C5b = np.cos(th5b)
+    S5b = np.sin(th5b)
+    # Link 1
+    VP11 = -gx*C1 - gy*S1
+    VP21 = gx*S1 - gy*C1
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    DV232 = QP2*W22
+    WP12 = DV232 - S2*QDP1
+    DV132 = QP2*W12
+    WP22 = -C2*QDP1 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U122 = DV122 - QDP2
+    U132 = DV132 + WP22
+    U212 = QDP2 + DV122
+    U222 = -DV112 - DV332
+    U232 = DV232 - WP12
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    VP12 = C2*VP11
+    VP22 = -S2*VP11
+    # Link 3
+    W13 = S5*QP1
+    W23 = C5*QP1
+    DV233 = QP5*W23
+    WP13 = S5*QDP1 + DV233
+    DV133 = QP5*W13
+    WP23 = C5*QDP1 - DV133
+    DV113 = W13**2
+    DV123 = W13*W23
+    DV223 = W23**2
+    DV333 = QP5**2
+    DW233 = DV223 - DV333
+    DW313 = DV333 - DV113
+    DW123 = DV113 - DV223
+    U113 = -DV223 - DV333
+    U123 = DV123 - QDP5
+    U133 = DV133 + WP23
+    U213 = QDP5 + DV123
+    U223 = -DV113 - DV333
+    U233 = DV233 - WP13
+    U313 = DV133 - WP23
+    U323 = DV233 + WP13
+    VSP13 = VP12 + D3*U112
+    VSP23 = VP22 + D3*U212
+    VSP33 = VP21 + D3*U312
+    VP13 = S2m5*VSP23 - C2m5*VSP13
+    VP23 = -C2m5*VSP23 - S2m5*VSP13
+    # Link 4
+    W14 = np.sin(c)*QP1
+    W24 = cosc*QP1
+    WP24 = cosc*QDP1
+    DV124 = W14*W24
+    DV224 = W24**2
+    VSP14 = VP13 + D4*U113
+    VSP24 = VP23 + D4*U213
+    VSP34 = VSP33 + D4*U313
+    VP24 = C5b*VSP24 + S5b*VSP14
+    # Link 5
+    VP15 = C5*VP11
+    VP25 = -S5*VP11
+    # Link 6
+    VSP16 = VP15 + D6*U113
+    VSP26 = VP25 + D6*U213
+    VSP36 = VP21 - D6*U313
+    VP16 = C2m5*VSP16 + S2m5*VSP26
+    # Joint 6
+    F16 = MY6*U122
+    F26 = MY6*U222
+    F36 = MY6*U322
+    N16 = MY6*VSP36
+    N36 = -MY6*VP16
+    FDI26 = S2m5*F16 + C2m5*F26
+    # Joint 5
+    N15 = MY5*VP21
+    N25 = -MX5R*VP21
+    N35 = MX5R*VP25 - MY5*VP15
+    NE15 = C2m5*N16 + N15
+    NE25 = S2m5*N16 + N25 - D6*F36
+    NE35 = N36 + D6*FDI26 + N35
+    # Joint 4
+    F14 = -MX4R*DV224
+    F24 = MX4R*DV124
+    F34 = -MX4R*WP24
+    N24 = -MX4R*VSP34
+    N34 = MX4R*VP24
+    FDI14 = C5b*F14 + S5b*F24
+    FDI24 = C5b*F24 - S5b*F14
+    # Joint 3
+    F13 = MX3R*U113 + MY3*U123
+    F23 = MX3R*U213 + MY3*U223
+    F33 = MX3R*U313 + MY3*U323
+    E13 = FDI14 + F13
+    E23 = FDI24 + F23
+    E33 = F34 + F33
+    N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3R*DW233 + XZ3R*U213 + MY3*VSP33 - XY3R*U313
+    N23 = (XX3R - ZZ3R)*DV133 + XZ3R*DW313 + XY3R*U323 - YZ3R*U123 - MX3R*VSP33
+    N33 = ZZ3R*QDP5 + XY3R*DW123 + YZ3R*U133 + MX3R*VP23 - XX3R*DV123 - XZ3R*U233 - MY3*VP13
+    NE13 = S5b*N24 + N13
+    NE23 = C5b*N24 + N23 - D4*F34
+    NE33 = N34 + D4*FDI24 + N33
+    FDI23 = S2m5*E13 - C2m5*E23
+    # Joint 2
+    N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*U212 + MY2*VP21 - XY2R*U312
+    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*U122 - MX2R*VP21
+    N32 = ZZ2R*QDP2 + XY2R*DW122 + YZ2R*U132 + MX2R*VP22 - XX2R*DV122 - XZ2R*U232 - MY2*VP12
+    NE12 = N12 - C2m5*NE13 - S2m5*NE23
+    NE22 = S2m5*NE13 + N22 - C2m5*NE23 - D3*E33
+    NE32 = NE33 + D3*FDI23 + N32
+    # Joint 1
+    N31 = ZZ1R*QDP1 + MX1*VP21 - MY1R*VP11
+    NE31 = N31 - S5*NE15 - C5*NE25 - S2*NE12 - C2*NE22
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + FV2R*QP2 + FS2R*np.sign(QP2) + N36 - NE33
+    GAM[2] = NE33 + OFFSET5 + NE35 + FV5R*QP5 + FS5R*np.sign(QP5) - N34 - N36
+
+
+def _inertia_matrix_block(q, A, X, D3, D4, D6, c, gx, gy):
+    """Fill A, shape (3, 3, N): column i is Gamma for a unit acceleration of joint i from rest. q: (3, N)."""
+    # Inputs
+    q2 = q[1]
+    q5 = q[2]
+    ZZ1R = X[0]
+    XX2R = X[6]
+    XY2R = X[7]
+    XZ2R = X[8]
+    YZ2R = X[9]
+    ZZ2R = X[10]
+    XX3R = X[16]
+    XY3R = X[17]
+    XZ3R = X[18]
+    YZ3R = X[19]
+    ZZ3R = X[20]
+    MX3R = X[21]
+    MY3 = X[22]
+    MX4R = X[23]
+    MY6 = X[29]
+    # Constants
+    WP241 = np.cos(c)
+    F341 = -MX4R*WP241
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m5 = q2 - q5
+    C2m5 = np.cos(th2m5)
+    S2m5 = np.sin(th2m5)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    th5b = q5 - c
+    C5b = np.cos(th5b)
+    S5b = np.sin(th5b)
+    # Link 3
+    VSP331 = D3*C2
+    # Link 4
+    VSP341 = VSP331 - D4*C5
+    # Link 6
+    VSP361 = D6*C5
+    # Joint 6
+    F361 = -MY6*S2
+    N161 = MY6*VSP361
+    NE151 = C2m5*N161
+    NE251 = S2m5*N161 - D6*F361
+    # Joint 4
+    N241 = -MX4R*VSP341
+    # Joint 3
+    F331 = MY3*S5 - MX3R*C5
+    E331 = F341 + F331
+    N331 = YZ3R*C5 + XZ3R*S5
+    N131 = XX3R*S5 + XY3R*C5 + MY3*VSP331
+    N231 = XY3R*S5 - MX3R*VSP331
+    NE131 = S5b*N241 + N131
+    NE231 = C5b*N241 + N231 - D4*F341
+    # Joint 2
+    N121 = -XX2R*S2 - XY2R*C2
+    N221 = -XY2R*S2
+    N321 = -YZ2R*C2 - XZ2R*S2
+    NE121 = N121 - C2m5*NE131 - S2m5*NE231
+    NE221 = S2m5*NE131 + N221 - C2m5*NE231 - D3*E331
+    NE321 = N331 + N321
+    # Joint 1
+    NE311 = ZZ1R - S5*NE151 - C5*NE251 - S2*NE121 - C2*NE221
+    # Link 3
+    VP132 = D3*S2m5
+    VP232 = -D3*C2m5
+    # Link 4
+    VP242 = C5b*VP232 + S5b*VP132
+    # Joint 6
+    FDI262 = -MY6*S2m5
+    NE352 = D6*FDI262
+    # Joint 4
+    N342 = MX4R*VP242
+    # Joint 3
+    N332 = MX3R*VP232 - MY3*VP132
+    NE332 = N342 + N332
+    # Joint 2
+    NE322 = ZZ2R + NE332
+    # Link 4
+    VP245 = D4*C5b
+    # Joint 4
+    N345 = MX4R*VP245
+    # Joint 3
+    NE335 = ZZ3R + N345
+    # Inertia matrix
+    A[0, 0] = NE311
+    A[1, 0] = A[0, 1] = NE321 - N331
+    A[2, 0] = A[0, 2] = N331
+    A[1, 1] = NE322 - NE332
+    A[2, 1] = A[1, 2] = NE332 + NE352 - N342
+    A[2, 2] = NE335 - N345
+
+
+def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
+    """Fill GAM, shape (3, N), for qdd = 0. q, qd: (3, N)."""
+    # Inputs
+    q1, q2, q5 = q
+    QP1, QP2, QP5 = qd
+    MX1 = X[1]
+    MY1R = X[2]
+    FV1 = X[3]
+    FS1 = X[4]
+    OFFSET1 = X[5]
+    XX2R = X[6]
+    XY2R = X[7]
+    XZ2R = X[8]
+    YZ2R = X[9]
+    ZZ2R = X[10]
+    MX2R = X[11]
+    MY2 = X[12]
+    FV2R = X[13]
+    FS2R = X[14]
+    OFFSET2 = X[15]
+    XX3R = X[16]
+    XY3R = X[17]
+    XZ3R = X[18]
+    YZ3R = X[19]
+    ZZ3R = X[20]
+    MX3R = X[21]
+    MY3 = X[22]
+    MX4R = X[23]
+    MX5R = X[24]
+    MY5 = X[25]
+    FV5R = X[26]
+    FS5R = X[27]
+    OFFSET5 = X[28]
+    MY6 = X[29]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m5 = q2 - q5
+    C2m5 = np.cos(th2m5)
+    S2m5 = np.sin(th2m5)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    th5b = q5 - c
+    C5b = np.cos(th5b)
+    S5b = np.sin(th5b)
+    # Link 1
+    VP11 = -gx*C1 - gy*S1
+    VP21 = gx*S1 - gy*C1
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    WP12 = QP2*W22
+    WP22 = -QP2*W12
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U222 = -DV112 - DV332
+    U312 = -2*WP22
+    U322 = 2*WP12
+    VP12 = C2*VP11
+    VP22 = -S2*VP11
+    # Link 3
+    W13 = S5*QP1
+    W23 = C5*QP1
+    WP13 = QP5*W23
+    WP23 = -QP5*W13
+    DV113 = W13**2
+    DV123 = W13*W23
+    DV223 = W23**2
+    DV333 = QP5**2
+    DW233 = DV223 - DV333
+    DW313 = DV333 - DV113
+    DW123 = DV113 - DV223
+    U113 = -DV223 - DV333
+    U223 = -DV113 - DV333
+    U313 = -2*WP23
+    U323 = 2*WP13
+    VSP13 = VP12 + D3*U112
+    VSP23 = VP22 + D3*DV122
+    VSP33 = VP21 + D3*U312
+    VP13 = S2m5*VSP23 - C2m5*VSP13
+    VP23 = -C2m5*VSP23 - S2m5*VSP13
+    # Link 4
+    W14 = np.sin(c)*QP1
+    W24 = np.cos(c)*QP1
+    DV124 = W14*W24
+    DV224 = W24**2
+    VSP14 = VP13 + D4*U113
+    VSP24 = VP23 + D4*DV123
+    VSP34 = VSP33 + D4*U313
+    VP24 = C5b*VSP24 + S5b*VSP14
+    # Link 5
+    VP15 = C5*VP11
+    VP25 = -S5*VP11
+    # Link 6
+    VSP16 = VP15 + D6*U113
+    VSP26 = VP25 + D6*DV123
+    VSP36 = VP21 - D6*U313
+    VP16 = C2m5*VSP16 + S2m5*VSP26
+    # Joint 6
+    F16 = MY6*DV122
+    F26 = MY6*U222
+    F36 = MY6*U322
+    N16 = MY6*VSP36
+    N36 = -MY6*VP16
+    FDI26 = S2m5*F16 + C2m5*F26
+    # Joint 5
+    N15 = MY5*VP21
+    N25 = -MX5R*VP21
+    N35 = MX5R*VP25 - MY5*VP15
+    NE15 = C2m5*N16 + N15
+    NE25 = S2m5*N16 + N25 - D6*F36
+    NE35 = N36 + D6*FDI26 + N35
+    # Joint 4
+    F14 = -MX4R*DV224
+    F24 = MX4R*DV124
+    N24 = -MX4R*VSP34
+    N34 = MX4R*VP24
+    FDI14 = C5b*F14 + S5b*F24
+    FDI24 = C5b*F24 - S5b*F14
+    # Joint 3
+    F13 = MX3R*U113 + MY3*DV123
+    F23 = MX3R*DV123 + MY3*U223
+    F33 = MX3R*U313 + MY3*U323
+    E13 = FDI14 + F13
+    E23 = FDI24 + F23
+    N13 = XX3R*WP13 + ZZ3R*WP13 + YZ3R*DW233 + XZ3R*DV123 + MY3*VSP33 - XY3R*U313
+    N23 = XZ3R*DW313 + XY3R*U323 - (XX3R - ZZ3R)*WP23 - YZ3R*DV123 - MX3R*VSP33
+    N33 = XY3R*DW123 + MX3R*VP23 - XX3R*DV123 - MY3*VP13
+    NE13 = S5b*N24 + N13
+    NE23 = C5b*N24 + N23
+    NE33 = N34 + D4*FDI24 + N33
+    FDI23 = S2m5*E13 - C2m5*E23
+    # Joint 2
+    N12 = XX2R*WP12 + ZZ2R*WP12 + YZ2R*DW232 + XZ2R*DV122 + MY2*VP21 - XY2R*U312
+    N22 = XZ2R*DW312 + XY2R*U322 - (XX2R - ZZ2R)*WP22 - YZ2R*DV122 - MX2R*VP21
+    N32 = XY2R*DW122 + MX2R*VP22 - XX2R*DV122 - MY2*VP12
+    NE12 = N12 - C2m5*NE13 - S2m5*NE23
+    NE22 = S2m5*NE13 + N22 - C2m5*NE23 - D3*F33
+    NE32 = NE33 + D3*FDI23 + N32
+    # Joint 1
+    N31 = MX1*VP21 - MY1R*VP11
+    NE31 = N31 - S5*NE15 - C5*NE25 - S2*NE12 - C2*NE22
+    # Torques
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE32 + FV2R*QP2 + FS2R*np.sign(QP2) + N36 - NE33
+    GAM[2] = NE33 + OFFSET5 + NE35 + FV5R*QP5 + FS5R*np.sign(QP5) - N34 - N36
+
+
+def _gravity_block(q, GAM, X, D3, D4, D6, c, gx, gy):
+    """Fill GAM, shape (3, N), at rest. q: (3, N)."""
+    # Inputs
+    q1, q2, q5 = q
+    MX1 = X[1]
+    MY1R = X[2]
+    OFFSET1 = X[5]
+    MX2R = X[11]
+    MY2 = X[12]
+    OFFSET2 = X[15]
+    MX3R = X[21]
+    MY3 = X[22]
+    MX4R = X[23]
+    MX5R = X[24]
+    MY5 = X[25]
+    OFFSET5 = X[28]
+    MY6 = X[29]
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m5 = q2 - q5
+    C2m5 = np.cos(th2m5)
+    S2m5 = np.sin(th2m5)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    th5b = q5 - c
+    C5b = np.cos(th5b)
+    S5b = np.sin(th5b)
+    # Link 1
+    VP11 = -gx*C1 - gy*S1
+    VP21 = gx*S1 - gy*C1
+    # Link 2
+    VP12 = C2*VP11
+    VP22 = -S2*VP11
+    # Link 3
+    VP13 = S2m5*VP22 - C2m5*VP12
+    VP23 = -C2m5*VP22 - S2m5*VP12
+    # Link 4
+    VP24 = C5b*VP23 + S5b*VP13
+    # Link 5
+    VP15 = C5*VP11
+    VP25 = -S5*VP11
+    # Link 6
+    VP16 = C2m5*VP15 + S2m5*VP25
+    # Joint 6
+    N16 = MY6*VP21
+    N36 = -MY6*VP16
+    # Joint 5
+    N15 = MY5*VP21
+    N25 = -MX5R*VP21
+    N35 = MX5R*VP25 - MY5*VP15
+    NE15 = C2m5*N16 + N15
+    NE25 = S2m5*N16 + N25
+    NE35 = N36 + N35
+    # Joint 4
+    N24 = -MX4R*VP21
+    N34 = MX4R*VP24
+    # Joint 3
+    N13 = MY3*VP21
+    N23 = -MX3R*VP21
+    N33 = MX3R*VP23 - MY3*VP13
+    NE13 = S5b*N24 + N13
+    NE23 = C5b*N24 + N23
+    NE33 = N34 + N33
+    # Joint 2
+    N12 = MY2*VP21
+    N22 = -MX2R*VP21
+    N32 = MX2R*VP22 - MY2*VP12
+    NE12 = N12 - C2m5*NE13 - S2m5*NE23
+    NE22 = S2m5*NE13 + N22 - C2m5*NE23
+    NE32 = NE33 + N32
+    # Joint 1
+    N31 = MX1*VP21 - MY1R*VP11
+    NE31 = N31 - S5*NE15 - C5*NE25 - S2*NE12 - C2*NE22
+    # Torques
+    GAM[0] = OFFSET1 + NE31
+    GAM[1] = OFFSET2 + NE32 + N36 - NE33
+    GAM[2] = NE33 + OFFSET5 + NE35 - N34 - N36
+
+
+def _frame_poses_block(q, T, D3, D4, D6, c, gx, gy):
+    """Fill T, shape (8, 4, 4, N). q: (3, N)."""
+    # Inputs
+    q1, q2, q5 = q
+    # Constants
+    R324 = np.cos(c)
+    R314 = np.sin(c)
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    # Frame 2
+    R112 = C1*C2
+    R122 = -C1*S2
+    R212 = S1*C2
+    R222 = -S1*S2
+    # Frame 3
+    R113 = -C1*C5
+    R123 = C1*S5
+    R213 = -S1*C5
+    R223 = S1*S5
+    P13 = D3*R112
+    P23 = D3*R212
+    P33 = -D3*S2
+    # Frame 4
+    R114 = -R324*C1
+    R124 = R314*C1
+    R214 = -R324*S1
+    R224 = R314*S1
+    P14 = P13 + D4*R113
+    P24 = P23 + D4*R213
+    P34 = P33 + D4*S5
+    # Frame 6
+    P16 = -D6*R113
+    P26 = -D6*R213
+    P36 = -D6*S5
+    # Frame 7
+    P17 = P13 + P16
+    P27 = P23 + P26
+    P37 = P33 + P36
+    # Poses
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 0, 2] = 0.0
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 1, 2] = 0.0
+    T[0, 2, 0] = 0.0
+    T[0, 2, 1] = 0.0
+    T[0, 2, 2] = 1.0
+    T[0, 0, 3] = 0.0
+    T[0, 1, 3] = 0.0
+    T[0, 2, 3] = 0.0
+    T[1, 0, 0] = R112
+    T[1, 0, 1] = R122
+    T[1, 0, 2] = -S1
+    T[1, 1, 0] = R212
+    T[1, 1, 1] = R222
+    T[1, 1, 2] = C1
+    T[1, 2, 0] = -S2
+    T[1, 2, 1] = -C2
+    T[1, 2, 2] = 0.0
+    T[1, 0, 3] = 0.0
+    T[1, 1, 3] = 0.0
+    T[1, 2, 3] = 0.0
+    T[2, 0, 0] = R113
+    T[2, 0, 1] = R123
+    T[2, 0, 2] = -S1
+    T[2, 1, 0] = R213
+    T[2, 1, 1] = R223
+    T[2, 1, 2] = C1
+    T[2, 2, 0] = S5
+    T[2, 2, 1] = C5
+    T[2, 2, 2] = 0.0
+    T[2, 0, 3] = P13
+    T[2, 1, 3] = P23
+    T[2, 2, 3] = P33
+    T[3, 0, 0] = R114
+    T[3, 0, 1] = R124
+    T[3, 0, 2] = -S1
+    T[3, 1, 0] = R214
+    T[3, 1, 1] = R224
+    T[3, 1, 2] = C1
+    T[3, 2, 0] = R314
+    T[3, 2, 1] = R324
+    T[3, 2, 2] = 0.0
+    T[3, 0, 3] = P14
+    T[3, 1, 3] = P24
+    T[3, 2, 3] = P34
+    T[4, 0, 0] = -R113
+    T[4, 0, 1] = -R123
+    T[4, 0, 2] = -S1
+    T[4, 1, 0] = -R213
+    T[4, 1, 1] = -R223
+    T[4, 1, 2] = C1
+    T[4, 2, 0] = -S5
+    T[4, 2, 1] = -C5
+    T[4, 2, 2] = 0.0
+    T[4, 0, 3] = 0.0
+    T[4, 1, 3] = 0.0
+    T[4, 2, 3] = 0.0
+    T[5, 0, 0] = R112
+    T[5, 0, 1] = R122
+    T[5, 0, 2] = -S1
+    T[5, 1, 0] = R212
+    T[5, 1, 1] = R222
+    T[5, 1, 2] = C1
+    T[5, 2, 0] = -S2
+    T[5, 2, 1] = -C2
+    T[5, 2, 2] = 0.0
+    T[5, 0, 3] = P16
+    T[5, 1, 3] = P26
+    T[5, 2, 3] = P36
+    T[6, 0, 0] = R113
+    T[6, 0, 1] = R123
+    T[6, 0, 2] = -S1
+    T[6, 1, 0] = R213
+    T[6, 1, 1] = R223
+    T[6, 1, 2] = C1
+    T[6, 2, 0] = S5
+    T[6, 2, 1] = C5
+    T[6, 2, 2] = 0.0
+    T[6, 0, 3] = P17
+    T[6, 1, 3] = P27
+    T[6, 2, 3] = P37
+    T[7, 0, 0] = R113
+    T[7, 0, 1] = R123
+    T[7, 0, 2] = -S1
+    T[7, 1, 0] = R213
+    T[7, 1, 1] = R223
+    T[7, 1, 2] = C1
+    T[7, 2, 0] = S5
+    T[7, 2, 1] = C5
+    T[7, 2, 2] = 0.0
+    T[7, 0, 3] = P17
+    T[7, 1, 3] = P27
+    T[7, 2, 3] = P37

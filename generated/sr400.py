@@ -1,0 +1,1873 @@
+"""SR400, 6 actuated joints, one parallelogram: base parameters, regressor, dynamics.
+
+GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.1.0. Do not edit; symgen generate sr400
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+     j  ant  mu  sigma  gamma  alpha    d  theta    r
+     1    0   1      0      0      0    0     q1    0
+     2    1   1      0      0  -pi/2   D2     q2    0
+     3    2   0      0      0      0   D3     q3    0
+     4    3   1      0      0  -pi/2   D4     q4  RL4
+     5    4   1      0      0   pi/2    0     q5    0
+     6    5   1      0      0  -pi/2    0     q6    0
+     7    1   1      0      0  -pi/2   D2     q7    0
+     8    7   0      0      0      0   D8     q8    0
+     9    8   0      0      0      0   D3     q9    0
+    10    3   0      2   pi/2      0  -D8      0    0
+Gravity     acceleration (0, 0, -g) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1, q2, q4, q5, q6, q7
+Element     FV      viscous: along q1, q2, q4, q5, q6, q7
+Element     FS      coulomb: along q1, q2, q4, q5, q6, q7
+Element     OFFSET  offset: along q1, q2, q4, q5, q6, q7
+Loop        frame 10 coincides with cut frame 9
+Loop        q3 = pi/2 - q2 + q7
+Loop        q8 = q2 - q7
+Loop        q9 = pi - q2 + q7
+
+Base parameters, 60 of 104; Gautier and Khalil (1990), exact over F_p
+    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 + (D2**2 + D3**2 + D4**2)*(M4 +
+        M5 + M6)
+    XX2R = XX2 - YY2 + XX8 - YY8 - D3**2*(M3 + M4 + M5 + M6)
+    XY2R = XY2 + XY8
+    XZ2R = XZ2 + XZ8 - D3*MZ3
+    YZ2R = YZ2 + YZ8
+    ZZ2R = ZZ2 + Ia2 + ZZ8 + D3**2*(M3 + M4 + M5 + M6)
+    MX2R = MX2 + MX8 + D3*(M3 + M4 + M5 + M6)
+    XX3R = XX3 - YY3 + YY4 - XX7 + YY7 + 2*RL4*MZ4 + (-D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8
+    XY3R = XY3 - XY7 - D4*MZ4 - D4*RL4*(M4 + M5 + M6)
+    XZ3R = XZ3 + YZ7
+    YZ3R = YZ3 - XZ7 + D8*MZ8
+    ZZ3R = ZZ3 + YY4 + ZZ7 + Ia7 + 2*RL4*MZ4 + (D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8
+    MX3R = MX3 + D4*(M4 + M5 + M6)
+    MY3R = MY3 + MZ4 + RL4*(M4 + M5 + M6) - D8/D3*MX8
+    XX4R = XX4 - YY4 + YY5
+    ZZ4R = ZZ4 + YY5
+    MY4R = MY4 - MZ5
+    XX5R = XX5 - YY5 + YY6
+    ZZ5R = ZZ5 + YY6
+    MY5R = MY5 + MZ6
+    XX6R = XX6 - YY6
+    MX7R = MX7 - D8/D3*MX8 + D8*M8
+    as they are: FV1 FS1 OFFSET1 MY2 FV2 FS2 OFFSET2 XY4 XZ4 YZ4 MX4 Ia4 FV4 FS4 OFFSET4 XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5
+        OFFSET5 XY6 XZ6 YZ6 ZZ6 MX6 MY6 Ia6 FV6 FS6 OFFSET6 MY7 FV7 FS7 OFFSET7 MY8
+No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 MZ7
+
+Cost per sample
+    regressor         392 multiplications, 290 additions, 6 sin, 6 cos
+    inverse_dynamics  300 multiplications, 285 additions, 6 sin, 6 cos
+    inertia_matrix    328 multiplications, 231 additions, 6 sin, 6 cos
+    bias              283 multiplications, 248 additions, 6 sin, 6 cos
+    gravity           57 multiplications, 42 additions, 6 sin, 6 cos
+    frame_poses       56 multiplications, 31 additions, 6 sin, 6 cos
+"""
+
+import numpy as np
+
+SCHEMA = 1
+NAME = 'sr400'
+SOURCE_SHA256 = '52f8fa1fb7bcb34e02e1d13b0386d4ccebf82b01028f393f42dd79d54ad69a8a'
+JOINTS = (1, 2, 4, 5, 6, 7)
+PASSIVE = (3, 8, 9)
+CONSTANTS = {'D2': 0.25, 'D3': 0.6, 'D4': 0.15, 'RL4': 0.7, 'D8': 0.3, 'g': 9.81}
+BASE_PARAMETERS = (
+    'ZZ1R', 'FV1', 'FS1', 'OFFSET1', 'XX2R', 'XY2R', 'XZ2R', 'YZ2R', 'ZZ2R', 'MX2R', 'MY2', 'FV2', 'FS2', 'OFFSET2',
+    'XX3R', 'XY3R', 'XZ3R', 'YZ3R', 'ZZ3R', 'MX3R', 'MY3R', 'XX4R', 'XY4', 'XZ4', 'YZ4', 'ZZ4R', 'MX4', 'MY4R', 'Ia4',
+    'FV4', 'FS4', 'OFFSET4', 'XX5R', 'XY5', 'XZ5', 'YZ5', 'ZZ5R', 'MX5', 'MY5R', 'Ia5', 'FV5', 'FS5', 'OFFSET5', 'XX6R',
+    'XY6', 'XZ6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'Ia6', 'FV6', 'FS6', 'OFFSET6', 'MX7R', 'MY7', 'FV7', 'FS7', 'OFFSET7',
+    'MY8',
+)
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
+    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4', 'MX4', 'MY4', 'MZ4', 'M4', 'Ia4',
+    'FV4', 'FS4', 'OFFSET4', 'XX5', 'XY5', 'XZ5', 'YY5', 'YZ5', 'ZZ5', 'MX5', 'MY5', 'MZ5', 'M5', 'Ia5', 'FV5', 'FS5',
+    'OFFSET5', 'XX6', 'XY6', 'XZ6', 'YY6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'MZ6', 'M6', 'Ia6', 'FV6', 'FS6', 'OFFSET6',
+    'XX7', 'XY7', 'XZ7', 'YY7', 'YZ7', 'ZZ7', 'MX7', 'MY7', 'MZ7', 'M7', 'Ia7', 'FV7', 'FS7', 'OFFSET7', 'XX8', 'XY8',
+    'XZ8', 'YY8', 'YZ8', 'ZZ8', 'MX8', 'MY8', 'MZ8', 'M8',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m', 'XX2R': 'kg*m**2', 'XY2R': 'kg*m**2',
+    'XZ2R': 'kg*m**2', 'YZ2R': 'kg*m**2', 'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m', 'MY2': 'kg*m', 'FV2': 'N*m*s/rad',
+    'FS2': 'N*m', 'OFFSET2': 'N*m', 'XX3R': 'kg*m**2', 'XY3R': 'kg*m**2', 'XZ3R': 'kg*m**2', 'YZ3R': 'kg*m**2',
+    'ZZ3R': 'kg*m**2', 'MX3R': 'kg*m', 'MY3R': 'kg*m', 'XX4R': 'kg*m**2', 'XY4': 'kg*m**2', 'XZ4': 'kg*m**2',
+    'YZ4': 'kg*m**2', 'ZZ4R': 'kg*m**2', 'MX4': 'kg*m', 'MY4R': 'kg*m', 'Ia4': 'kg*m**2', 'FV4': 'N*m*s/rad',
+    'FS4': 'N*m', 'OFFSET4': 'N*m', 'XX5R': 'kg*m**2', 'XY5': 'kg*m**2', 'XZ5': 'kg*m**2', 'YZ5': 'kg*m**2',
+    'ZZ5R': 'kg*m**2', 'MX5': 'kg*m', 'MY5R': 'kg*m', 'Ia5': 'kg*m**2', 'FV5': 'N*m*s/rad', 'FS5': 'N*m',
+    'OFFSET5': 'N*m', 'XX6R': 'kg*m**2', 'XY6': 'kg*m**2', 'XZ6': 'kg*m**2', 'YZ6': 'kg*m**2', 'ZZ6': 'kg*m**2',
+    'MX6': 'kg*m', 'MY6': 'kg*m', 'Ia6': 'kg*m**2', 'FV6': 'N*m*s/rad', 'FS6': 'N*m', 'OFFSET6': 'N*m', 'MX7R': 'kg*m',
+    'MY7': 'kg*m', 'FV7': 'N*m*s/rad', 'FS7': 'N*m', 'OFFSET7': 'N*m', 'MY8': 'kg*m',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 + (D2**2 + D3**2 + D4**2)*(M4 + M5 + M6)',
+    'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1', 'XX2R': 'XX2 - YY2 + XX8 - YY8 - D3**2*(M3 + M4 + M5 + M6)',
+    'XY2R': 'XY2 + XY8', 'XZ2R': 'XZ2 + XZ8 - D3*MZ3', 'YZ2R': 'YZ2 + YZ8',
+    'ZZ2R': 'ZZ2 + Ia2 + ZZ8 + D3**2*(M3 + M4 + M5 + M6)', 'MX2R': 'MX2 + MX8 + D3*(M3 + M4 + M5 + M6)', 'MY2': 'MY2',
+    'FV2': 'FV2', 'FS2': 'FS2', 'OFFSET2': 'OFFSET2',
+    'XX3R': 'XX3 - YY3 + YY4 - XX7 + YY7 + 2*RL4*MZ4 + (-D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8',
+    'XY3R': 'XY3 - XY7 - D4*MZ4 - D4*RL4*(M4 + M5 + M6)', 'XZ3R': 'XZ3 + YZ7', 'YZ3R': 'YZ3 - XZ7 + D8*MZ8',
+    'ZZ3R': 'ZZ3 + YY4 + ZZ7 + Ia7 + 2*RL4*MZ4 + (D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8',
+    'MX3R': 'MX3 + D4*(M4 + M5 + M6)', 'MY3R': 'MY3 + MZ4 + RL4*(M4 + M5 + M6) - D8/D3*MX8', 'XX4R': 'XX4 - YY4 + YY5',
+    'XY4': 'XY4', 'XZ4': 'XZ4', 'YZ4': 'YZ4', 'ZZ4R': 'ZZ4 + YY5', 'MX4': 'MX4', 'MY4R': 'MY4 - MZ5', 'Ia4': 'Ia4',
+    'FV4': 'FV4', 'FS4': 'FS4', 'OFFSET4': 'OFFSET4', 'XX5R': 'XX5 - YY5 + YY6', 'XY5': 'XY5', 'XZ5': 'XZ5',
+    'YZ5': 'YZ5', 'ZZ5R': 'ZZ5 + YY6', 'MX5': 'MX5', 'MY5R': 'MY5 + MZ6', 'Ia5': 'Ia5', 'FV5': 'FV5', 'FS5': 'FS5',
+    'OFFSET5': 'OFFSET5', 'XX6R': 'XX6 - YY6', 'XY6': 'XY6', 'XZ6': 'XZ6', 'YZ6': 'YZ6', 'ZZ6': 'ZZ6', 'MX6': 'MX6',
+    'MY6': 'MY6', 'Ia6': 'Ia6', 'FV6': 'FV6', 'FS6': 'FS6', 'OFFSET6': 'OFFSET6', 'MX7R': 'MX7 - D8/D3*MX8 + D8*M8',
+    'MY7': 'MY7', 'FV7': 'FV7', 'FS7': 'FS7', 'OFFSET7': 'OFFSET7', 'MY8': 'MY8',
+}
+NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'MZ2', 'MZ7')
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x.....", "x.....", "x.....", "x.....", "xx....", "xx....", "xx....", "xx....", ".x....", "xx....", "xx....",
+    ".x....", ".x....", ".x....", "x....x", "x....x", "x....x", "x....x", ".....x", "xx...x", "xx...x", "x.x..x",
+    "x.x..x", "x.x..x", "x.x..x", "x.x..x", "xxx..x", "xxx..x", "..x...", "..x...", "..x...", "..x...", "x.xx.x",
+    "x.xx.x", "x.xx.x", "x.xx.x", "x.xx.x", "xxxx.x", "xxxx.x", "...x..", "...x..", "...x..", "...x..", "x.xxxx",
+    "x.xxxx", "x.xxxx", "x.xxxx", "x.xxxx", "xxxxxx", "xxxxxx", "....x.", "....x.", "....x.", "....x.", "x....x",
+    "x....x", ".....x", ".....x", ".....x", "xx...x",
+)])
+DRIVES = None
+LIMITS = {}
+VALUES = {}
+_PATHS = {
+    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
+    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0)))),
+    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0))), (4, 0, ((2, 1.0),))),
+    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0))), (4, 0, ((2, 1.0),)), (5, 0, ((3, 1.0),))),
+    6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0))), (4, 0, ((2, 1.0),)), (5, 0, ((3, 1.0),)), (6, 0, ((4, 1.0),))),
+    7: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),))),
+    8: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0)))),
+    9: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0))), (9, 0, ((1, -1.0), (5, 1.0)))),
+    10: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0)))),
+}
+
+
+class Store(np.ndarray):
+    """Room for a regressor, made by `store`; views and copies of one are no stores."""
+
+    ready = False
+
+    def __array_finalize__(self, parent):
+        self.ready = False
+
+
+def store(N):
+    """Room for N samples, shape (60, 6, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
+    S = np.zeros((60, 6, N)).view(Store)
+    S[3, 0] = 1.0
+    S[13, 1] = 1.0
+    S[31, 2] = 1.0
+    S[42, 3] = 1.0
+    S[53, 4] = 1.0
+    S[58, 5] = 1.0
+    S.ready = True
+    return S
+
+
+def _fill(block, result, states, *arguments):
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
+    N = len(states[0])
+    B = max(N, 1) if N <= 8192 else 4096
+    for t in range(0, N, B):
+        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+    return result
+
+
+def _filled_store(q, qd, qdd, out, *constants):
+    N = np.size(q) // 6
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (60, 6, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(60, 6, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
+
+
+def _by_sample(result, q):
+    """Samples first; for a single state (n,) without them."""
+    result = np.moveaxis(result, -1, 0)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def base_parameters(standard, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """X, shape (60,), from the 104 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, XX4, XY4, XZ4, YY4, YZ4, ZZ4,
+        MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5,
+        OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7,
+        MX7, MY7, MZ7, M7, Ia7, FV7, FS7, OFFSET7, XX8, XY8, XZ8, YY8, YZ8, ZZ8, MX8, MY8, MZ8, M8
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 + (D2**2 + D3**2 + D4**2)*(M4 + M5 + M6)
+    XX2R = XX2 - YY2 + XX8 - YY8 - D3**2*(M3 + M4 + M5 + M6)
+    XY2R = XY2 + XY8
+    XZ2R = XZ2 + XZ8 - D3*MZ3
+    YZ2R = YZ2 + YZ8
+    ZZ2R = ZZ2 + Ia2 + ZZ8 + D3**2*(M3 + M4 + M5 + M6)
+    MX2R = MX2 + MX8 + D3*(M3 + M4 + M5 + M6)
+    XX3R = XX3 - YY3 + YY4 - XX7 + YY7 + 2*RL4*MZ4 + (-D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8
+    XY3R = XY3 - XY7 - D4*MZ4 - D4*RL4*(M4 + M5 + M6)
+    XZ3R = XZ3 + YZ7
+    YZ3R = YZ3 - XZ7 + D8*MZ8
+    ZZ3R = ZZ3 + YY4 + ZZ7 + Ia7 + 2*RL4*MZ4 + (D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8
+    MX3R = MX3 + D4*(M4 + M5 + M6)
+    MY3R = MY3 + MZ4 + RL4*(M4 + M5 + M6) - D8/D3*MX8
+    XX4R = XX4 - YY4 + YY5
+    ZZ4R = ZZ4 + YY5
+    MY4R = MY4 - MZ5
+    XX5R = XX5 - YY5 + YY6
+    ZZ5R = ZZ5 + YY6
+    MY5R = MY5 + MZ6
+    XX6R = XX6 - YY6
+    MX7R = MX7 - D8/D3*MX8 + D8*M8
+    return np.array([
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R,
+        MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5,
+        FV5, FS5, OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, MX7R, MY7, FV7, FS7, OFFSET7, MY8,
+    ])
+
+
+def regressor(q, qd, qdd, *, out=None, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """D of Gamma = D X, shape (N, 6, 60); q, qd, qdd of shape (N, 6) or (6,), rad or m and seconds.
+
+    A view on one store of shape (60, 6, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
+    faults, up to several times the arithmetic for large N.
+    """
+    S = _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g)
+    D = S.transpose(2, 1, 0)
+    return D[0] if np.ndim(q) == 1 else D
+
+
+def observation_matrix(q, qd, qdd, *, out=None, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """W of Y = W X + rho, shape (6*N, 60), Fortran order, rows joint-major: the same store, no copy."""
+    return _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g).reshape(60, -1).T
+
+
+def inverse_dynamics(q, qd, qdd, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """Joint torques Gamma, shape (N, 6), of base parameters X, shape (60,)."""
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q, qd, qdd)
+    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D2, D3, D4, RL4, D8, g), q)
+
+
+def inertia_matrix(q, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """A(q), shape (N, 6, 6), actuators included."""
+    A = np.empty((6, 6, np.size(q) // 6))
+    states = (q,)
+    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D2, D3, D4, RL4, D8, g), q)
+
+
+def bias(q, qd, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """Gamma at qdd = 0, shape (N, 6): Coriolis, centrifugal, gravity, friction and offset."""
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q, qd)
+    return _by_sample(_fill(_bias_block, GAM, states, X, D2, D3, D4, RL4, D8, g), q)
+
+
+def gravity(q, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """Gamma at rest without friction, shape (N, 6): gravity, offset and springs (a base parameter may mix them)."""
+    GAM = np.empty((6, np.size(q) // 6))
+    states = (q,)
+    return _by_sample(_fill(_gravity_block, GAM, states, X, D2, D3, D4, RL4, D8, g), q)
+
+
+def forward_dynamics(q, qd, tau, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """qdd = A(q)**-1 (tau - bias), shape (N, 6)."""
+    A, H = inertia_matrix(q, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g), bias(q, qd, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
+    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """Homogeneous transform of every frame j in frame 0, shape (N, 10, 4, 4), at index j - 1."""
+    T = np.zeros((10, 4, 4, np.size(q) // 6))
+    T[:, 3, 3] = 1.0
+    states = (q,)
+    return _by_sample(_fill(_frame_poses_block, T, states, D2, D3, D4, RL4, D8, g), q)
+
+
+def jacobian(q, *, frame=10, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """J, shape (N, 6, 6): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g).reshape(-1, 10, 4, 4)
+    J = np.zeros((len(T), 6, 6))
+    P = T[:, (10 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[10 if frame is None else frame]:
+        z = T[:, j - 1, :3, 2]
+        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
+        for k, rate in rates:
+            J[:, :3, k] += rate * v
+            J[:, 3:, k] += rate * w
+    return J[0] if np.ndim(q) == 1 else J
+
+
+def passive_joints(q, qd=None, qdd=None, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also their accelerations."""
+    rates = np.array([
+        [0, -1, 0, 0, 0, 1],
+        [0, 1, 0, 0, 0, -1],
+        [0, -1, 0, 0, 0, 1],
+    ], dtype=float)
+    offsets = np.array([np.pi/2, 0, np.pi], dtype=float)
+    states = [q, qd, qdd]
+    found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
+    found[0] += offsets
+    return found[0] if len(found) == 1 else tuple(found)
+
+
+def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
+    """Fill D, shape (60, 6, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q4 = q[2]
+    q5 = q[3]
+    q6 = q[4]
+    q7 = q[5]
+    QP1, QP2, QP4, QP5, QP6, QP7 = qd
+    QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m7 = q2 - q7
+    C2m7 = np.cos(th2m7)
+    S2m7 = np.sin(th2m7)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 1
+    DV3_3_1 = QP1**2
+    # Link 2
+    W1_2 = -S2*QP1
+    W2_2 = -C2*QP1
+    U2_3_2 = S2*QDP1
+    U1_3_2 = -C2*QDP1
+    DV2_3_2 = QP2*W2_2
+    WP1_2 = DV2_3_2 - U2_3_2
+    DV1_3_2 = QP2*W1_2
+    WP2_2 = U1_3_2 - DV1_3_2
+    DV1_1_2 = W1_2**2
+    DV1_2_2 = W1_2*W2_2
+    DV2_2_2 = W2_2**2
+    DV3_3_2 = QP2**2
+    DW2_3_2 = DV2_2_2 - DV3_3_2
+    DW3_1_2 = DV3_3_2 - DV1_1_2
+    DW1_2_2 = DV1_1_2 - DV2_2_2
+    U1_1_2 = -DV2_2_2 - DV3_3_2
+    U1_2_2 = DV1_2_2 - QDP2
+    U2_1_2 = QDP2 + DV1_2_2
+    U2_2_2 = -DV1_1_2 - DV3_3_2
+    U3_1_2 = DV1_3_2 - WP2_2
+    U3_2_2 = DV2_3_2 + WP1_2
+    VSP1_2 = -D2*DV3_3_1
+    VSP2_2 = D2*QDP1
+    VP1_2 = C2*VSP1_2 - g*S2
+    VP2_2 = -g*C2 - S2*VSP1_2
+    # Link 3
+    W1_3 = -C7*QP1
+    W2_3 = S7*QP1
+    U2_3_3 = C7*QDP1
+    U1_3_3 = S7*QDP1
+    DV2_3_3 = QP7*W2_3
+    WP1_3 = DV2_3_3 - U2_3_3
+    DV1_3_3 = QP7*W1_3
+    WP2_3 = U1_3_3 - DV1_3_3
+    DV1_1_3 = W1_3**2
+    DV1_2_3 = W1_3*W2_3
+    DV2_2_3 = W2_3**2
+    DV3_3_3 = QP7**2
+    DW2_3_3 = DV2_2_3 - DV3_3_3
+    DW3_1_3 = DV3_3_3 - DV1_1_3
+    DW1_2_3 = DV1_1_3 - DV2_2_3
+    U1_1_3 = -DV2_2_3 - DV3_3_3
+    U1_2_3 = DV1_2_3 - QDP7
+    U2_1_3 = QDP7 + DV1_2_3
+    U2_2_3 = -DV1_1_3 - DV3_3_3
+    U3_1_3 = DV1_3_3 - WP2_3
+    U3_2_3 = DV2_3_3 + WP1_3
+    VSP1_3 = VP1_2 + D3*U1_1_2
+    VSP2_3 = VP2_2 + D3*U2_1_2
+    VSP3_3 = VSP2_2 + D3*U3_1_2
+    VP1_3 = S2m7*VSP1_3 + C2m7*VSP2_3
+    VP2_3 = S2m7*VSP2_3 - C2m7*VSP1_3
+    # Link 4
+    W1_4 = C4*W1_3 - S4*QP7
+    W2_4 = -C4*QP7 - S4*W1_3
+    W3_4 = QP4 + W2_3
+    WP1_4 = C4*WP1_3 + QP4*W2_4 - S4*QDP7
+    WP2_4 = -C4*QDP7 - S4*WP1_3 - QP4*W1_4
+    WP3_4 = QDP4 + WP2_3
+    DV1_1_4 = W1_4**2
+    DV1_2_4 = W1_4*W2_4
+    DV1_3_4 = W1_4*W3_4
+    DV2_2_4 = W2_4**2
+    DV2_3_4 = W2_4*W3_4
+    DV3_3_4 = W3_4**2
+    DW2_3_4 = DV2_2_4 - DV3_3_4
+    DW3_1_4 = DV3_3_4 - DV1_1_4
+    DW1_2_4 = DV1_1_4 - DV2_2_4
+    U1_1_4 = -DV2_2_4 - DV3_3_4
+    U1_2_4 = DV1_2_4 - WP3_4
+    U1_3_4 = WP2_4 + DV1_3_4
+    U2_1_4 = WP3_4 + DV1_2_4
+    U2_2_4 = -DV1_1_4 - DV3_3_4
+    U2_3_4 = DV2_3_4 - WP1_4
+    U3_1_4 = DV1_3_4 - WP2_4
+    U3_2_4 = WP1_4 + DV2_3_4
+    VSP1_4 = VP1_3 + D4*U1_1_3 + RL4*U1_2_3
+    VSP2_4 = VP2_3 + D4*U2_1_3 + RL4*U2_2_3
+    VSP3_4 = VSP3_3 + D4*U3_1_3 + RL4*U3_2_3
+    VP1_4 = C4*VSP1_4 - S4*VSP3_4
+    VP2_4 = -C4*VSP3_4 - S4*VSP1_4
+    # Link 5
+    W1_5 = C5*W1_4 + S5*W3_4
+    W2_5 = C5*W3_4 - S5*W1_4
+    W3_5 = QP5 - W2_4
+    WP1_5 = C5*WP1_4 + S5*WP3_4 + QP5*W2_5
+    WP2_5 = C5*WP3_4 - S5*WP1_4 - QP5*W1_5
+    WP3_5 = QDP5 - WP2_4
+    DV1_1_5 = W1_5**2
+    DV1_2_5 = W1_5*W2_5
+    DV1_3_5 = W1_5*W3_5
+    DV2_2_5 = W2_5**2
+    DV2_3_5 = W2_5*W3_5
+    DV3_3_5 = W3_5**2
+    DW2_3_5 = DV2_2_5 - DV3_3_5
+    DW3_1_5 = DV3_3_5 - DV1_1_5
+    DW1_2_5 = DV1_1_5 - DV2_2_5
+    U1_1_5 = -DV2_2_5 - DV3_3_5
+    U1_2_5 = DV1_2_5 - WP3_5
+    U1_3_5 = WP2_5 + DV1_3_5
+    U2_1_5 = WP3_5 + DV1_2_5
+    U2_2_5 = -DV1_1_5 - DV3_3_5
+    U2_3_5 = DV2_3_5 - WP1_5
+    U3_1_5 = DV1_3_5 - WP2_5
+    U3_2_5 = WP1_5 + DV2_3_5
+    VP1_5 = C5*VP1_4 + S5*VSP2_4
+    VP2_5 = C5*VSP2_4 - S5*VP1_4
+    # Link 6
+    W1_6 = C6*W1_5 - S6*W3_5
+    W2_6 = -C6*W3_5 - S6*W1_5
+    W3_6 = QP6 + W2_5
+    WP1_6 = C6*WP1_5 + QP6*W2_6 - S6*WP3_5
+    WP2_6 = -C6*WP3_5 - S6*WP1_5 - QP6*W1_6
+    WP3_6 = QDP6 + WP2_5
+    DV1_1_6 = W1_6**2
+    DV1_2_6 = W1_6*W2_6
+    DV1_3_6 = W1_6*W3_6
+    DV2_2_6 = W2_6**2
+    DV2_3_6 = W2_6*W3_6
+    DV3_3_6 = W3_6**2
+    DW2_3_6 = DV2_2_6 - DV3_3_6
+    DW3_1_6 = DV3_3_6 - DV1_1_6
+    DW1_2_6 = DV1_1_6 - DV2_2_6
+    U1_1_6 = -DV2_2_6 - DV3_3_6
+    U1_2_6 = DV1_2_6 - WP3_6
+    U1_3_6 = WP2_6 + DV1_3_6
+    U2_1_6 = WP3_6 + DV1_2_6
+    U2_2_6 = -DV1_1_6 - DV3_3_6
+    U2_3_6 = DV2_3_6 - WP1_6
+    U3_1_6 = DV1_3_6 - WP2_6
+    U3_2_6 = WP1_6 + DV2_3_6
+    VP1_6 = C6*VP1_5 + S6*VP2_4
+    VP2_6 = C6*VP2_4 - S6*VP1_5
+    # Link 7
+    VP1_7 = C7*VSP1_2 - g*S7
+    VP2_7 = -g*C7 - S7*VSP1_2
+    # Link 8
+    VSP1_8 = VP1_7 + D8*U2_2_3
+    VSP2_8 = VP2_7 - D8*U1_2_3
+    VSP3_8 = VSP2_2 - D8*U3_2_3
+    VP1_8 = C2m7*VSP1_8 + S2m7*VSP2_8
+    # Joint axes Z and velocities V seen from link 3
+    V3_3_1 = D2 + D3*C2
+    V1_3_2 = D3*C2m7
+    V2_3_2 = D3*S2m7
+    # Joint axes Z and velocities V seen from link 4
+    Z1_4_1 = -C7*C4
+    Z2_4_1 = C7*S4
+    VS3_4_1 = V3_3_1 - RL4*C7 - D4*S7
+    V1_4_1 = -S4*VS3_4_1
+    V2_4_1 = -C4*VS3_4_1
+    VS1_4_2 = V1_3_2 - RL4
+    V3_4_2 = D4 + V2_3_2
+    V1_4_2 = C4*VS1_4_2
+    V2_4_2 = -S4*VS1_4_2
+    V1_4_3 = -RL4*C4
+    V2_4_3 = RL4*S4
+    # Joint axes Z and velocities V seen from link 5
+    Z1_5_1 = C5*Z1_4_1 + S7*S5
+    Z2_5_1 = S7*C5 - S5*Z1_4_1
+    V1_5_1 = C5*V1_4_1
+    V2_5_1 = -S5*V1_4_1
+    Z1_5_2 = -S4*C5
+    Z2_5_2 = S4*S5
+    V1_5_2 = C5*V1_4_2 + S5*V3_4_2
+    V2_5_2 = C5*V3_4_2 - S5*V1_4_2
+    V1_5_3 = C5*V1_4_3 + D4*S5
+    V2_5_3 = D4*C5 - S5*V1_4_3
+    # Joint axes Z and velocities V seen from link 6
+    Z1_6_1 = C6*Z1_5_1 + S6*Z2_4_1
+    Z2_6_1 = C6*Z2_4_1 - S6*Z1_5_1
+    V1_6_1 = C6*V1_5_1 + S6*V2_4_1
+    V2_6_1 = C6*V2_4_1 - S6*V1_5_1
+    Z1_6_2 = C6*Z1_5_2 - C4*S6
+    Z2_6_2 = -C4*C6 - S6*Z1_5_2
+    V1_6_2 = C6*V1_5_2 + S6*V2_4_2
+    V2_6_2 = C6*V2_4_2 - S6*V1_5_2
+    V1_6_3 = C6*V1_5_3 + S6*V2_4_3
+    V2_6_3 = C6*V2_4_3 - S6*V1_5_3
+    Z1_6_4 = S5*C6
+    Z2_6_4 = -S5*S6
+    # Joint axes Z and velocities V seen from link 8
+    V3_8_1 = D2 + D8*C7
+    V1_8_7 = D8*S2m7
+    V2_8_7 = D8*C2m7
+    # Contributions that several joints share
+    DV1_3_4Z2_4_1 = DV1_3_4*Z2_4_1
+    C4DV1_3_4 = C4*DV1_3_4
+    DN2MX4 = C4*VSP2_4
+    DG3MX4 = DN2MX4 + U1_1_4*V1_4_3 + U2_1_4*V2_4_3 + D4*U3_1_4
+    DN2MY4 = -S4*VSP2_4
+    DG3MY4 = DN2MY4 + U1_2_4*V1_4_3 + U2_2_4*V2_4_3 + D4*U3_2_4
+    DV1_3_5Z2_5_1 = DV1_3_5*Z2_5_1
+    DV1_3_5Z2_5_2 = DV1_3_5*Z2_5_2
+    C5DV1_3_5 = C5*DV1_3_5
+    DN2MX5 = VP2_4*Z2_5_2 + C4*VP2_5
+    DG3MX5 = DN2MX5 + U1_1_5*V1_5_3 + U2_1_5*V2_5_3 - U3_1_5*V2_4_3
+    DN2MY5 = -VP2_4*Z1_5_2 - C4*VP1_5
+    DG3MY5 = DN2MY5 + U1_2_5*V1_5_3 + U2_2_5*V2_5_3 - U3_2_5*V2_4_3
+    DV1_3_6Z2_6_1 = DV1_3_6*Z2_6_1
+    DV1_3_6Z2_6_2 = DV1_3_6*Z2_6_2
+    DV1_3_6Z2_6_4 = DV1_3_6*Z2_6_4
+    C6DV1_3_6 = C6*DV1_3_6
+    DN2MX6 = VP2_6*Z2_5_2 - VP2_5*Z2_6_2
+    DG3MX6 = DN2MX6 + U1_1_6*V1_6_3 + U2_1_6*V2_6_3 + U3_1_6*V2_5_3
+    DN2MY6 = VP2_5*Z1_6_2 - VP1_6*Z2_5_2
+    DG3MY6 = DN2MY6 + U1_2_6*V1_6_3 + U2_2_6*V2_6_3 + U3_2_6*V2_5_3
+    # Joint 1
+    D[0, 0] = QDP1                                                    # DG1ZZ1
+    D[1, 0] = QP1                                                     # DG1FV1
+    D[2, 0] = np.sign(QP1)                                            # DG1FS1
+    D[4, 0] = -S2*WP1_2 - C2*DV1_3_2                                  # DG1XX2
+    D[5, 0] = S2*U3_1_2 - C2*U3_2_2                                   # DG1XY2
+    D[6, 0] = -S2*U2_1_2 - C2*DW3_1_2                                 # DG1XZ2
+    D[7, 0] = C2*U1_2_2 - S2*DW2_3_2                                  # DG1YZ2
+    D[9, 0] = C2*VSP2_2 + D2*U3_1_2                                   # DG1MX2
+    D[10, 0] = D2*U3_2_2 - S2*VSP2_2                                  # DG1MY2
+    D[14, 0] = S7*DV1_3_3 - C7*WP1_3                                  # DG1XX3
+    D[15, 0] = C7*U3_1_3 + S7*U3_2_3                                  # DG1XY3
+    D[16, 0] = S7*DW3_1_3 - C7*U2_1_3                                 # DG1XZ3
+    D[17, 0] = -C7*DW2_3_3 - S7*U1_2_3                                # DG1YZ3
+    D[19, 0] = U3_1_3*V3_3_1 - S7*VSP3_3                              # DG1MX3
+    D[20, 0] = U3_2_3*V3_3_1 - C7*VSP3_3                              # DG1MY3
+    D[21, 0] = WP1_4*Z1_4_1 + DV1_3_4Z2_4_1 - S7*DV1_2_4              # DG1XX4
+    D[22, 0] = U3_2_4*Z2_4_1 + S7*DW1_2_4 - U3_1_4*Z1_4_1             # DG1XY4
+    D[23, 0] = U2_1_4*Z1_4_1 + DW3_1_4*Z2_4_1 - S7*U2_3_4             # DG1XZ4
+    D[24, 0] = DW2_3_4*Z1_4_1 + S7*U1_3_4 - U1_2_4*Z2_4_1             # DG1YZ4
+    D[25, 0] = DV2_3_4*Z1_4_1 + S7*WP3_4 - DV1_3_4Z2_4_1              # DG1ZZ4
+    D[26, 0] = S7*VP2_4 + U1_1_4*V1_4_1 + U2_1_4*V2_4_1 - VSP2_4*Z2_4_1  # DG1MX4
+    D[27, 0] = VSP2_4*Z1_4_1 + U1_2_4*V1_4_1 + U2_2_4*V2_4_1 - S7*VP1_4  # DG1MY4
+    D[32, 0] = WP1_5*Z1_5_1 + DV1_3_5Z2_5_1 + DV1_2_5*Z2_4_1          # DG1XX5
+    D[33, 0] = U3_2_5*Z2_5_1 - U3_1_5*Z1_5_1 - DW1_2_5*Z2_4_1         # DG1XY5
+    D[34, 0] = U2_1_5*Z1_5_1 + DW3_1_5*Z2_5_1 + U2_3_5*Z2_4_1         # DG1XZ5
+    D[35, 0] = DW2_3_5*Z1_5_1 - U1_2_5*Z2_5_1 - U1_3_5*Z2_4_1         # DG1YZ5
+    D[36, 0] = DV2_3_5*Z1_5_1 - DV1_3_5Z2_5_1 - WP3_5*Z2_4_1          # DG1ZZ5
+    D[37, 0] = VP2_4*Z2_5_1 + U1_1_5*V1_5_1 + U2_1_5*V2_5_1 - VP2_5*Z2_4_1 - U3_1_5*V2_4_1  # DG1MX5
+    D[38, 0] = VP1_5*Z2_4_1 + U1_2_5*V1_5_1 + U2_2_5*V2_5_1 - VP2_4*Z1_5_1 - U3_2_5*V2_4_1  # DG1MY5
+    D[43, 0] = WP1_6*Z1_6_1 + DV1_3_6Z2_6_1 - DV1_2_6*Z2_5_1          # DG1XX6
+    D[44, 0] = U3_2_6*Z2_6_1 + DW1_2_6*Z2_5_1 - U3_1_6*Z1_6_1         # DG1XY6
+    D[45, 0] = U2_1_6*Z1_6_1 + DW3_1_6*Z2_6_1 - U2_3_6*Z2_5_1         # DG1XZ6
+    D[46, 0] = DW2_3_6*Z1_6_1 + U1_3_6*Z2_5_1 - U1_2_6*Z2_6_1         # DG1YZ6
+    D[47, 0] = DV2_3_6*Z1_6_1 + WP3_6*Z2_5_1 - DV1_3_6Z2_6_1          # DG1ZZ6
+    D[48, 0] = VP2_6*Z2_5_1 + U1_1_6*V1_6_1 + U2_1_6*V2_6_1 + U3_1_6*V2_5_1 - VP2_5*Z2_6_1  # DG1MX6
+    D[49, 0] = VP2_5*Z1_6_1 + U1_2_6*V1_6_1 + U2_2_6*V2_6_1 + U3_2_6*V2_5_1 - VP1_6*Z2_5_1  # DG1MY6
+    D[54, 0] = C7*VSP2_2 - D2*U3_2_3                                  # DG1MX7
+    D[55, 0] = D2*U3_1_3 - S7*VSP2_2                                  # DG1MY7
+    D[59, 0] = U3_2_2*V3_8_1 - S2*VSP3_8                              # DG1MY8
+    # Joint 2
+    D[4, 1] = -DV1_2_2                                                # DG2XX2
+    D[5, 1] = DW1_2_2                                                 # DG2XY2
+    D[6, 1] = -U2_3_2                                                 # DG2XZ2
+    D[7, 1] = U1_3_2                                                  # DG2YZ2
+    D[8, 1] = QDP2                                                    # DG2ZZ2
+    D[9, 1] = VP2_2                                                   # DG2MX2
+    D[10, 1] = -VP1_2                                                 # DG2MY2
+    D[11, 1] = QP2                                                    # DG2FV2
+    D[12, 1] = np.sign(QP2)                                           # DG2FS2
+    D[19, 1] = U1_1_3*V1_3_2 + U2_1_3*V2_3_2                          # DG2MX3
+    D[20, 1] = U1_2_3*V1_3_2 + U2_2_3*V2_3_2                          # DG2MY3
+    D[26, 1] = DN2MX4 + U1_1_4*V1_4_2 + U2_1_4*V2_4_2 + U3_1_4*V3_4_2 - DG3MX4  # DG2MX4
+    D[27, 1] = DN2MY4 + U1_2_4*V1_4_2 + U2_2_4*V2_4_2 + U3_2_4*V3_4_2 - DG3MY4  # DG2MY4
+    D[37, 1] = DN2MX5 + U1_1_5*V1_5_2 + U2_1_5*V2_5_2 - U3_1_5*V2_4_2 - DG3MX5  # DG2MX5
+    D[38, 1] = DN2MY5 + U1_2_5*V1_5_2 + U2_2_5*V2_5_2 - U3_2_5*V2_4_2 - DG3MY5  # DG2MY5
+    D[48, 1] = DN2MX6 + U1_1_6*V1_6_2 + U2_1_6*V2_6_2 + U3_1_6*V2_5_2 - DG3MX6  # DG2MX6
+    D[49, 1] = DN2MY6 + U1_2_6*V1_6_2 + U2_2_6*V2_6_2 + U3_2_6*V2_5_2 - DG3MY6  # DG2MY6
+    D[59, 1] = -VP1_8                                                 # DG2MY8
+    # Joint 4
+    D[21, 2] = -DV1_2_4                                    # DG4XX4
+    D[22, 2] = DW1_2_4                                     # DG4XY4
+    D[23, 2] = -U2_3_4                                     # DG4XZ4
+    D[24, 2] = U1_3_4                                      # DG4YZ4
+    D[25, 2] = WP3_4                                       # DG4ZZ4
+    D[26, 2] = VP2_4                                       # DG4MX4
+    D[27, 2] = -VP1_4                                      # DG4MY4
+    D[28, 2] = QDP4                                        # DG4Ia4
+    D[29, 2] = QP4                                         # DG4FV4
+    D[30, 2] = np.sign(QP4)                                # DG4FS4
+    D[32, 2] = S5*WP1_5 + C5DV1_3_5                        # DG4XX5
+    D[33, 2] = C5*U3_2_5 - S5*U3_1_5                       # DG4XY5
+    D[34, 2] = S5*U2_1_5 + C5*DW3_1_5                      # DG4XZ5
+    D[35, 2] = S5*DW2_3_5 - C5*U1_2_5                      # DG4YZ5
+    D[36, 2] = S5*DV2_3_5 - C5DV1_3_5                      # DG4ZZ5
+    D[37, 2] = C5*VP2_4                                    # DG4MX5
+    D[38, 2] = -S5*VP2_4                                   # DG4MY5
+    D[43, 2] = WP1_6*Z1_6_4 + DV1_3_6Z2_6_4 - C5*DV1_2_6   # DG4XX6
+    D[44, 2] = U3_2_6*Z2_6_4 + C5*DW1_2_6 - U3_1_6*Z1_6_4  # DG4XY6
+    D[45, 2] = U2_1_6*Z1_6_4 + DW3_1_6*Z2_6_4 - C5*U2_3_6  # DG4XZ6
+    D[46, 2] = DW2_3_6*Z1_6_4 + C5*U1_3_6 - U1_2_6*Z2_6_4  # DG4YZ6
+    D[47, 2] = DV2_3_6*Z1_6_4 + C5*WP3_6 - DV1_3_6Z2_6_4   # DG4ZZ6
+    D[48, 2] = C5*VP2_6 - VP2_5*Z2_6_4                     # DG4MX6
+    D[49, 2] = VP2_5*Z1_6_4 - C5*VP1_6                     # DG4MY6
+    # Joint 5
+    D[32, 3] = -DV1_2_5                 # DG5XX5
+    D[33, 3] = DW1_2_5                  # DG5XY5
+    D[34, 3] = -U2_3_5                  # DG5XZ5
+    D[35, 3] = U1_3_5                   # DG5YZ5
+    D[36, 3] = WP3_5                    # DG5ZZ5
+    D[37, 3] = VP2_5                    # DG5MX5
+    D[38, 3] = -VP1_5                   # DG5MY5
+    D[39, 3] = QDP5                     # DG5Ia5
+    D[40, 3] = QP5                      # DG5FV5
+    D[41, 3] = np.sign(QP5)             # DG5FS5
+    D[43, 3] = -S6*WP1_6 - C6DV1_3_6    # DG5XX6
+    D[44, 3] = S6*U3_1_6 - C6*U3_2_6    # DG5XY6
+    D[45, 3] = -S6*U2_1_6 - C6*DW3_1_6  # DG5XZ6
+    D[46, 3] = C6*U1_2_6 - S6*DW2_3_6   # DG5YZ6
+    D[47, 3] = C6DV1_3_6 - S6*DV2_3_6   # DG5ZZ6
+    D[48, 3] = C6*VP2_5                 # DG5MX6
+    D[49, 3] = -S6*VP2_5                # DG5MY6
+    # Joint 6
+    D[43, 4] = -DV1_2_6      # DG6XX6
+    D[44, 4] = DW1_2_6       # DG6XY6
+    D[45, 4] = -U2_3_6       # DG6XZ6
+    D[46, 4] = U1_3_6        # DG6YZ6
+    D[47, 4] = WP3_6         # DG6ZZ6
+    D[48, 4] = VP2_6         # DG6MX6
+    D[49, 4] = -VP1_6        # DG6MY6
+    D[50, 4] = QDP6          # DG6Ia6
+    D[51, 4] = QP6           # DG6FV6
+    D[52, 4] = np.sign(QP6)  # DG6FS6
+    # Joint 7
+    D[14, 5] = -DV1_2_3                                        # DG7XX3
+    D[15, 5] = DW1_2_3                                         # DG7XY3
+    D[16, 5] = -U2_3_3                                         # DG7XZ3
+    D[17, 5] = U1_3_3                                          # DG7YZ3
+    D[18, 5] = QDP7                                            # DG7ZZ3
+    D[19, 5] = VP2_3                                           # DG7MX3
+    D[20, 5] = -VP1_3                                          # DG7MY3
+    D[21, 5] = -S4*WP1_4 - C4DV1_3_4                           # DG7XX4
+    D[22, 5] = S4*U3_1_4 - C4*U3_2_4                           # DG7XY4
+    D[23, 5] = -S4*U2_1_4 - C4*DW3_1_4                         # DG7XZ4
+    D[24, 5] = C4*U1_2_4 - S4*DW2_3_4                          # DG7YZ4
+    D[25, 5] = C4DV1_3_4 - S4*DV2_3_4                          # DG7ZZ4
+    D[26, 5] = DG3MX4                                          # DG7MX4
+    D[27, 5] = DG3MY4                                          # DG7MY4
+    D[32, 5] = WP1_5*Z1_5_2 + DV1_3_5Z2_5_2 - C4*DV1_2_5       # DG7XX5
+    D[33, 5] = U3_2_5*Z2_5_2 + C4*DW1_2_5 - U3_1_5*Z1_5_2      # DG7XY5
+    D[34, 5] = U2_1_5*Z1_5_2 + DW3_1_5*Z2_5_2 - C4*U2_3_5      # DG7XZ5
+    D[35, 5] = DW2_3_5*Z1_5_2 + C4*U1_3_5 - U1_2_5*Z2_5_2      # DG7YZ5
+    D[36, 5] = DV2_3_5*Z1_5_2 + C4*WP3_5 - DV1_3_5Z2_5_2       # DG7ZZ5
+    D[37, 5] = DG3MX5                                          # DG7MX5
+    D[38, 5] = DG3MY5                                          # DG7MY5
+    D[43, 5] = WP1_6*Z1_6_2 + DV1_3_6Z2_6_2 - DV1_2_6*Z2_5_2   # DG7XX6
+    D[44, 5] = U3_2_6*Z2_6_2 + DW1_2_6*Z2_5_2 - U3_1_6*Z1_6_2  # DG7XY6
+    D[45, 5] = U2_1_6*Z1_6_2 + DW3_1_6*Z2_6_2 - U2_3_6*Z2_5_2  # DG7XZ6
+    D[46, 5] = DW2_3_6*Z1_6_2 + U1_3_6*Z2_5_2 - U1_2_6*Z2_6_2  # DG7YZ6
+    D[47, 5] = DV2_3_6*Z1_6_2 + WP3_6*Z2_5_2 - DV1_3_6Z2_6_2   # DG7ZZ6
+    D[48, 5] = DG3MX6                                          # DG7MX6
+    D[49, 5] = DG3MY6                                          # DG7MY6
+    D[54, 5] = VP2_7                                           # DG7MX7
+    D[55, 5] = -VP1_7                                          # DG7MY7
+    D[56, 5] = QP7                                             # DG7FV7
+    D[57, 5] = np.sign(QP7)                                    # DG7FS7
+    D[59, 5] = U1_2_2*V1_8_7 + U2_2_2*V2_8_7                   # DG7MY8
+
+
+def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
+    """Fill GAM, shape (6, N). q, qd, qdd: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q4 = q[2]
+    q5 = q[3]
+    q6 = q[4]
+    q7 = q[5]
+    QP1, QP2, QP4, QP5, QP6, QP7 = qd
+    QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
+    (
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R, XY3R, XZ3R, YZ3R,
+        ZZ3R, MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5,
+        MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, MX7R, MY7, FV7, FS7,
+        OFFSET7, MY8
+    ) = X
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m7 = q2 - q7
+    C2m7 = np.cos(th2m7)
+    S2m7 = np.sin(th2m7)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 1
+    DV3_3_1 = QP1**2
+    # Link 2
+    W1_2 = -S2*QP1
+    W2_2 = -C2*QP1
+    DV2_3_2 = QP2*W2_2
+    WP1_2 = DV2_3_2 - S2*QDP1
+    DV1_3_2 = QP2*W1_2
+    WP2_2 = -C2*QDP1 - DV1_3_2
+    DV1_1_2 = W1_2**2
+    DV1_2_2 = W1_2*W2_2
+    DV2_2_2 = W2_2**2
+    DV3_3_2 = QP2**2
+    DW2_3_2 = DV2_2_2 - DV3_3_2
+    DW3_1_2 = DV3_3_2 - DV1_1_2
+    DW1_2_2 = DV1_1_2 - DV2_2_2
+    U1_1_2 = -DV2_2_2 - DV3_3_2
+    U1_2_2 = DV1_2_2 - QDP2
+    U1_3_2 = DV1_3_2 + WP2_2
+    U2_1_2 = QDP2 + DV1_2_2
+    U2_2_2 = -DV1_1_2 - DV3_3_2
+    U2_3_2 = DV2_3_2 - WP1_2
+    U3_1_2 = DV1_3_2 - WP2_2
+    U3_2_2 = DV2_3_2 + WP1_2
+    VSP1_2 = -D2*DV3_3_1
+    VSP2_2 = D2*QDP1
+    VP1_2 = C2*VSP1_2 - g*S2
+    VP2_2 = -g*C2 - S2*VSP1_2
+    # Link 3
+    W1_3 = -C7*QP1
+    W2_3 = S7*QP1
+    DV2_3_3 = QP7*W2_3
+    WP1_3 = DV2_3_3 - C7*QDP1
+    DV1_3_3 = QP7*W1_3
+    WP2_3 = S7*QDP1 - DV1_3_3
+    DV1_1_3 = W1_3**2
+    DV1_2_3 = W1_3*W2_3
+    DV2_2_3 = W2_3**2
+    DV3_3_3 = QP7**2
+    DW2_3_3 = DV2_2_3 - DV3_3_3
+    DW3_1_3 = DV3_3_3 - DV1_1_3
+    DW1_2_3 = DV1_1_3 - DV2_2_3
+    U1_1_3 = -DV2_2_3 - DV3_3_3
+    U1_2_3 = DV1_2_3 - QDP7
+    U1_3_3 = DV1_3_3 + WP2_3
+    U2_1_3 = QDP7 + DV1_2_3
+    U2_2_3 = -DV1_1_3 - DV3_3_3
+    U2_3_3 = DV2_3_3 - WP1_3
+    U3_1_3 = DV1_3_3 - WP2_3
+    U3_2_3 = DV2_3_3 + WP1_3
+    VSP1_3 = VP1_2 + D3*U1_1_2
+    VSP2_3 = VP2_2 + D3*U2_1_2
+    VSP3_3 = VSP2_2 + D3*U3_1_2
+    VP1_3 = S2m7*VSP1_3 + C2m7*VSP2_3
+    VP2_3 = S2m7*VSP2_3 - C2m7*VSP1_3
+    # Link 4
+    W1_4 = C4*W1_3 - S4*QP7
+    W2_4 = -C4*QP7 - S4*W1_3
+    W3_4 = QP4 + W2_3
+    WP1_4 = C4*WP1_3 + QP4*W2_4 - S4*QDP7
+    WP2_4 = -C4*QDP7 - S4*WP1_3 - QP4*W1_4
+    WP3_4 = QDP4 + WP2_3
+    DV1_1_4 = W1_4**2
+    DV1_2_4 = W1_4*W2_4
+    DV1_3_4 = W1_4*W3_4
+    DV2_2_4 = W2_4**2
+    DV2_3_4 = W2_4*W3_4
+    DV3_3_4 = W3_4**2
+    DW2_3_4 = DV2_2_4 - DV3_3_4
+    DW3_1_4 = DV3_3_4 - DV1_1_4
+    DW1_2_4 = DV1_1_4 - DV2_2_4
+    U1_1_4 = -DV2_2_4 - DV3_3_4
+    U1_2_4 = DV1_2_4 - WP3_4
+    U1_3_4 = WP2_4 + DV1_3_4
+    U2_1_4 = WP3_4 + DV1_2_4
+    U2_2_4 = -DV1_1_4 - DV3_3_4
+    U2_3_4 = DV2_3_4 - WP1_4
+    U3_1_4 = DV1_3_4 - WP2_4
+    U3_2_4 = WP1_4 + DV2_3_4
+    VSP1_4 = VP1_3 + D4*U1_1_3 + RL4*U1_2_3
+    VSP2_4 = VP2_3 + D4*U2_1_3 + RL4*U2_2_3
+    VSP3_4 = VSP3_3 + D4*U3_1_3 + RL4*U3_2_3
+    VP1_4 = C4*VSP1_4 - S4*VSP3_4
+    VP2_4 = -C4*VSP3_4 - S4*VSP1_4
+    # Link 5
+    W1_5 = C5*W1_4 + S5*W3_4
+    W2_5 = C5*W3_4 - S5*W1_4
+    W3_5 = QP5 - W2_4
+    WP1_5 = C5*WP1_4 + S5*WP3_4 + QP5*W2_5
+    WP2_5 = C5*WP3_4 - S5*WP1_4 - QP5*W1_5
+    WP3_5 = QDP5 - WP2_4
+    DV1_1_5 = W1_5**2
+    DV1_2_5 = W1_5*W2_5
+    DV1_3_5 = W1_5*W3_5
+    DV2_2_5 = W2_5**2
+    DV2_3_5 = W2_5*W3_5
+    DV3_3_5 = W3_5**2
+    DW2_3_5 = DV2_2_5 - DV3_3_5
+    DW3_1_5 = DV3_3_5 - DV1_1_5
+    DW1_2_5 = DV1_1_5 - DV2_2_5
+    U1_1_5 = -DV2_2_5 - DV3_3_5
+    U1_2_5 = DV1_2_5 - WP3_5
+    U1_3_5 = WP2_5 + DV1_3_5
+    U2_1_5 = WP3_5 + DV1_2_5
+    U2_2_5 = -DV1_1_5 - DV3_3_5
+    U2_3_5 = DV2_3_5 - WP1_5
+    U3_1_5 = DV1_3_5 - WP2_5
+    U3_2_5 = WP1_5 + DV2_3_5
+    VP1_5 = C5*VP1_4 + S5*VSP2_4
+    VP2_5 = C5*VSP2_4 - S5*VP1_4
+    # Link 6
+    W1_6 = C6*W1_5 - S6*W3_5
+    W2_6 = -C6*W3_5 - S6*W1_5
+    W3_6 = QP6 + W2_5
+    WP1_6 = C6*WP1_5 + QP6*W2_6 - S6*WP3_5
+    WP2_6 = -C6*WP3_5 - S6*WP1_5 - QP6*W1_6
+    WP3_6 = QDP6 + WP2_5
+    DV1_1_6 = W1_6**2
+    DV1_2_6 = W1_6*W2_6
+    DV1_3_6 = W1_6*W3_6
+    DV2_2_6 = W2_6**2
+    DV2_3_6 = W2_6*W3_6
+    DV3_3_6 = W3_6**2
+    DW2_3_6 = DV2_2_6 - DV3_3_6
+    DW3_1_6 = DV3_3_6 - DV1_1_6
+    DW1_2_6 = DV1_1_6 - DV2_2_6
+    U1_1_6 = -DV2_2_6 - DV3_3_6
+    U1_2_6 = DV1_2_6 - WP3_6
+    U1_3_6 = WP2_6 + DV1_3_6
+    U2_1_6 = WP3_6 + DV1_2_6
+    U2_2_6 = -DV1_1_6 - DV3_3_6
+    U2_3_6 = DV2_3_6 - WP1_6
+    U3_1_6 = DV1_3_6 - WP2_6
+    U3_2_6 = WP1_6 + DV2_3_6
+    VP1_6 = C6*VP1_5 + S6*VP2_4
+    VP2_6 = C6*VP2_4 - S6*VP1_5
+    # Link 7
+    VP1_7 = C7*VSP1_2 - g*S7
+    VP2_7 = -g*C7 - S7*VSP1_2
+    # Link 8
+    VSP1_8 = VP1_7 + D8*U2_2_3
+    VSP2_8 = VP2_7 - D8*U1_2_3
+    VSP3_8 = VSP2_2 - D8*U3_2_3
+    VP1_8 = C2m7*VSP1_8 + S2m7*VSP2_8
+    # Joint 8
+    F1_8 = MY8*U1_2_2
+    F2_8 = MY8*U2_2_2
+    F3_8 = MY8*U3_2_2
+    N1_8 = MY8*VSP3_8
+    N3_8 = -MY8*VP1_8
+    FDI2_8 = S2m7*F1_8 + C2m7*F2_8
+    # Joint 7
+    F3_7 = MY7*U3_1_3 - MX7R*U3_2_3
+    E3_7 = F3_8 + F3_7
+    N1_7 = MY7*VSP2_2
+    N2_7 = -MX7R*VSP2_2
+    N3_7 = MX7R*VP2_7 - MY7*VP1_7
+    NE1_7 = C2m7*N1_8 + N1_7
+    NE2_7 = S2m7*N1_8 + N2_7 - D8*F3_8
+    NE3_7 = N3_8 + D8*FDI2_8 + N3_7
+    # Joint 6
+    F1_6 = MX6*U1_1_6 + MY6*U1_2_6
+    F2_6 = MX6*U2_1_6 + MY6*U2_2_6
+    F3_6 = MX6*U3_1_6 + MY6*U3_2_6
+    N1_6 = XX6R*WP1_6 + ZZ6*DV2_3_6 + YZ6*DW2_3_6 + XZ6*U2_1_6 + MY6*VP2_5 - XY6*U3_1_6
+    N2_6 = (XX6R - ZZ6)*DV1_3_6 + XZ6*DW3_1_6 + XY6*U3_2_6 - YZ6*U1_2_6 - MX6*VP2_5
+    N3_6 = ZZ6*WP3_6 + XY6*DW1_2_6 + YZ6*U1_3_6 + MX6*VP2_6 - XX6R*DV1_2_6 - XZ6*U2_3_6 - MY6*VP1_6
+    FDI1_6 = C6*F1_6 - S6*F2_6
+    FDI3_6 = -S6*F1_6 - C6*F2_6
+    # Joint 5
+    F1_5 = MX5*U1_1_5 + MY5R*U1_2_5
+    F2_5 = MX5*U2_1_5 + MY5R*U2_2_5
+    F3_5 = MX5*U3_1_5 + MY5R*U3_2_5
+    E1_5 = FDI1_6 + F1_5
+    E2_5 = F3_6 + F2_5
+    E3_5 = FDI3_6 + F3_5
+    N1_5 = XX5R*WP1_5 + ZZ5R*DV2_3_5 + YZ5*DW2_3_5 + XZ5*U2_1_5 - XY5*U3_1_5 - MY5R*VP2_4
+    N2_5 = (XX5R - ZZ5R)*DV1_3_5 + XZ5*DW3_1_5 + XY5*U3_2_5 + MX5*VP2_4 - YZ5*U1_2_5
+    N3_5 = ZZ5R*WP3_5 + XY5*DW1_2_5 + YZ5*U1_3_5 + MX5*VP2_5 - XX5R*DV1_2_5 - XZ5*U2_3_5 - MY5R*VP1_5
+    NE1_5 = C6*N1_6 + N1_5 - S6*N2_6
+    NE2_5 = N3_6 + N2_5
+    NE3_5 = N3_5 - S6*N1_6 - C6*N2_6
+    FDI1_5 = C5*E1_5 - S5*E2_5
+    FDI3_5 = S5*E1_5 + C5*E2_5
+    # Joint 4
+    F1_4 = MX4*U1_1_4 + MY4R*U1_2_4
+    F2_4 = MX4*U2_1_4 + MY4R*U2_2_4
+    F3_4 = MX4*U3_1_4 + MY4R*U3_2_4
+    E1_4 = FDI1_5 + F1_4
+    E2_4 = F2_4 - E3_5
+    E3_4 = FDI3_5 + F3_4
+    N1_4 = XX4R*WP1_4 + ZZ4R*DV2_3_4 + YZ4*DW2_3_4 + XZ4*U2_1_4 + MY4R*VSP2_4 - XY4*U3_1_4
+    N2_4 = (XX4R - ZZ4R)*DV1_3_4 + XZ4*DW3_1_4 + XY4*U3_2_4 - YZ4*U1_2_4 - MX4*VSP2_4
+    N3_4 = ZZ4R*WP3_4 + XY4*DW1_2_4 + YZ4*U1_3_4 + MX4*VP2_4 - XX4R*DV1_2_4 - XZ4*U2_3_4 - MY4R*VP1_4
+    NE1_4 = C5*NE1_5 + N1_4 - S5*NE2_5
+    NE2_4 = N2_4 - NE3_5
+    NE3_4 = S5*NE1_5 + C5*NE2_5 + N3_4
+    FDI1_4 = C4*E1_4 - S4*E2_4
+    FDI3_4 = -S4*E1_4 - C4*E2_4
+    # Joint 3
+    F1_3 = MX3R*U1_1_3 + MY3R*U1_2_3
+    F2_3 = MX3R*U2_1_3 + MY3R*U2_2_3
+    F3_3 = MX3R*U3_1_3 + MY3R*U3_2_3
+    E1_3 = FDI1_4 + F1_3
+    E2_3 = E3_4 + F2_3
+    E3_3 = FDI3_4 + F3_3
+    N1_3 = XX3R*WP1_3 + ZZ3R*DV2_3_3 + YZ3R*DW2_3_3 + XZ3R*U2_1_3 + MY3R*VSP3_3 - XY3R*U3_1_3
+    N2_3 = (XX3R - ZZ3R)*DV1_3_3 + XZ3R*DW3_1_3 + XY3R*U3_2_3 - YZ3R*U1_2_3 - MX3R*VSP3_3
+    N3_3 = ZZ3R*QDP7 + XY3R*DW1_2_3 + YZ3R*U1_3_3 + MX3R*VP2_3 - XX3R*DV1_2_3 - XZ3R*U2_3_3 - MY3R*VP1_3
+    NE1_3 = C4*NE1_4 + RL4*FDI3_4 + N1_3 - S4*NE2_4
+    NE2_3 = NE3_4 + N2_3 - D4*FDI3_4
+    NE3_3 = D4*E3_4 + N3_3 - S4*NE1_4 - C4*NE2_4 - RL4*FDI1_4
+    FDI2_3 = C2m7*E1_3 + S2m7*E2_3
+    # Joint 2
+    F3_2 = MX2R*U3_1_2 + MY2*U3_2_2
+    E3_2 = E3_3 + F3_2
+    N1_2 = XX2R*WP1_2 + ZZ2R*DV2_3_2 + YZ2R*DW2_3_2 + XZ2R*U2_1_2 + MY2*VSP2_2 - XY2R*U3_1_2
+    N2_2 = (XX2R - ZZ2R)*DV1_3_2 + XZ2R*DW3_1_2 + XY2R*U3_2_2 - YZ2R*U1_2_2 - MX2R*VSP2_2
+    N3_2 = ZZ2R*QDP2 + XY2R*DW1_2_2 + YZ2R*U1_3_2 + MX2R*VP2_2 - XX2R*DV1_2_2 - XZ2R*U2_3_2 - MY2*VP1_2
+    NE1_2 = S2m7*NE1_3 + N1_2 - C2m7*NE2_3
+    NE2_2 = C2m7*NE1_3 + S2m7*NE2_3 + N2_2 - D3*E3_3
+    NE3_2 = NE3_3 + D3*FDI2_3 + N3_2
+    # Joint 1
+    N3_1 = ZZ1R*QDP1
+    NE3_1 = D2*E3_7 + D2*E3_2 + N3_1 - S7*NE1_7 - C7*NE2_7 - S2*NE1_2 - C2*NE2_2
+    # Torques
+    GAM[0] = OFFSET1 + NE3_1 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE3_2 + FV2*QP2 + FS2*np.sign(QP2) + N3_8 - NE3_3
+    GAM[2] = OFFSET4 + NE3_4 + Ia4*QDP4 + FV4*QP4 + FS4*np.sign(QP4)
+    GAM[3] = OFFSET5 + NE3_5 + Ia5*QDP5 + FV5*QP5 + FS5*np.sign(QP5)
+    GAM[4] = OFFSET6 + N3_6 + Ia6*QDP6 + FV6*QP6 + FS6*np.sign(QP6)
+    GAM[5] = NE3_3 + OFFSET7 + NE3_7 + FV7*QP7 + FS7*np.sign(QP7) - N3_8
+
+
+def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8, g):
+    """Fill A, shape (6, 6, N): column i is Gamma for a unit acceleration of joint i from rest. q: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q4 = q[2]
+    q5 = q[3]
+    q6 = q[4]
+    q7 = q[5]
+    ZZ1R = X[0]
+    XX2R = X[4]
+    XY2R = X[5]
+    XZ2R = X[6]
+    YZ2R = X[7]
+    ZZ2R = X[8]
+    MX2R = X[9]
+    MY2 = X[10]
+    XX3R = X[14]
+    XY3R = X[15]
+    XZ3R = X[16]
+    YZ3R = X[17]
+    ZZ3R = X[18]
+    MX3R = X[19]
+    MY3R = X[20]
+    XX4R = X[21]
+    XY4 = X[22]
+    XZ4 = X[23]
+    YZ4 = X[24]
+    ZZ4R = X[25]
+    MX4 = X[26]
+    MY4R = X[27]
+    Ia4 = X[28]
+    XX5R = X[32]
+    XY5 = X[33]
+    XZ5 = X[34]
+    YZ5 = X[35]
+    ZZ5R = X[36]
+    MX5 = X[37]
+    MY5R = X[38]
+    Ia5 = X[39]
+    XX6R = X[43]
+    XY6 = X[44]
+    XZ6 = X[45]
+    YZ6 = X[46]
+    ZZ6 = X[47]
+    MX6 = X[48]
+    MY6 = X[49]
+    Ia6 = X[50]
+    MX7R = X[54]
+    MY7 = X[55]
+    MY8 = X[59]
+    # Constants
+    N1_7_1 = MY7*D2
+    N2_7_1 = -MX7R*D2
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m7 = q2 - q7
+    C2m7 = np.cos(th2m7)
+    S2m7 = np.sin(th2m7)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 3
+    VSP3_3_1 = D2 + D3*C2
+    # Link 4
+    WP1_4_1 = -C7*C4
+    WP2_4_1 = C7*S4
+    VSP3_4_1 = VSP3_3_1 - D4*S7 - RL4*C7
+    VP1_4_1 = -S4*VSP3_4_1
+    VP2_4_1 = -C4*VSP3_4_1
+    # Link 5
+    WP1_5_1 = C5*WP1_4_1 + S7*S5
+    WP2_5_1 = S7*C5 - S5*WP1_4_1
+    VP1_5_1 = C5*VP1_4_1
+    VP2_5_1 = -S5*VP1_4_1
+    # Link 6
+    WP1_6_1 = C6*WP1_5_1 + S6*WP2_4_1
+    WP2_6_1 = C6*WP2_4_1 - S6*WP1_5_1
+    VP1_6_1 = C6*VP1_5_1 + S6*VP2_4_1
+    VP2_6_1 = C6*VP2_4_1 - S6*VP1_5_1
+    # Link 8
+    VSP3_8_1 = D2 + D8*C7
+    # Joint 8
+    F3_8_1 = -MY8*S2
+    N1_8_1 = MY8*VSP3_8_1
+    # Joint 7
+    F3_7_1 = MX7R*C7 - MY7*S7
+    E3_7_1 = F3_8_1 + F3_7_1
+    NE1_7_1 = C2m7*N1_8_1 + N1_7_1
+    NE2_7_1 = S2m7*N1_8_1 + N2_7_1 - D8*F3_8_1
+    # Joint 6
+    F1_6_1 = -MY6*WP2_5_1
+    F2_6_1 = MX6*WP2_5_1
+    F3_6_1 = MY6*WP1_6_1 - MX6*WP2_6_1
+    N1_6_1 = XX6R*WP1_6_1 + XZ6*WP2_5_1 + XY6*WP2_6_1 + MY6*VP2_5_1
+    N2_6_1 = XY6*WP1_6_1 + YZ6*WP2_5_1 - MX6*VP2_5_1
+    N3_6_1 = ZZ6*WP2_5_1 + YZ6*WP2_6_1 + XZ6*WP1_6_1 + MX6*VP2_6_1 - MY6*VP1_6_1
+    FDI1_6_1 = C6*F1_6_1 - S6*F2_6_1
+    FDI3_6_1 = -S6*F1_6_1 - C6*F2_6_1
+    # Joint 5
+    F1_5_1 = MY5R*WP2_4_1
+    F2_5_1 = -MX5*WP2_4_1
+    F3_5_1 = MY5R*WP1_5_1 - MX5*WP2_5_1
+    E1_5_1 = FDI1_6_1 + F1_5_1
+    E2_5_1 = F3_6_1 + F2_5_1
+    E3_5_1 = FDI3_6_1 + F3_5_1
+    N1_5_1 = XX5R*WP1_5_1 + XY5*WP2_5_1 - XZ5*WP2_4_1 - MY5R*VP2_4_1
+    N2_5_1 = XY5*WP1_5_1 + MX5*VP2_4_1 - YZ5*WP2_4_1
+    N3_5_1 = YZ5*WP2_5_1 + XZ5*WP1_5_1 + MX5*VP2_5_1 - ZZ5R*WP2_4_1 - MY5R*VP1_5_1
+    NE1_5_1 = C6*N1_6_1 + N1_5_1 - S6*N2_6_1
+    NE2_5_1 = N3_6_1 + N2_5_1
+    NE3_5_1 = N3_5_1 - S6*N1_6_1 - C6*N2_6_1
+    FDI1_5_1 = C5*E1_5_1 - S5*E2_5_1
+    FDI3_5_1 = S5*E1_5_1 + C5*E2_5_1
+    # Joint 4
+    F1_4_1 = -MY4R*S7
+    F2_4_1 = MX4*S7
+    F3_4_1 = MY4R*WP1_4_1 - MX4*WP2_4_1
+    E1_4_1 = FDI1_5_1 + F1_4_1
+    E2_4_1 = F2_4_1 - E3_5_1
+    E3_4_1 = FDI3_5_1 + F3_4_1
+    N1_4_1 = XX4R*WP1_4_1 + XZ4*S7 + XY4*WP2_4_1
+    N2_4_1 = XY4*WP1_4_1 + YZ4*S7
+    N3_4_1 = ZZ4R*S7 + YZ4*WP2_4_1 + XZ4*WP1_4_1 + MX4*VP2_4_1 - MY4R*VP1_4_1
+    NE1_4_1 = C5*NE1_5_1 + N1_4_1 - S5*NE2_5_1
+    NE2_4_1 = N2_4_1 - NE3_5_1
+    NE3_4_1 = S5*NE1_5_1 + C5*NE2_5_1 + N3_4_1
+    FDI1_4_1 = C4*E1_4_1 - S4*E2_4_1
+    FDI3_4_1 = -S4*E1_4_1 - C4*E2_4_1
+    # Joint 3
+    F3_3_1 = -MX3R*S7 - MY3R*C7
+    E3_3_1 = FDI3_4_1 + F3_3_1
+    N3_3_1 = YZ3R*S7 - XZ3R*C7
+    N1_3_1 = XY3R*S7 + MY3R*VSP3_3_1 - XX3R*C7
+    N2_3_1 = -XY3R*C7 - MX3R*VSP3_3_1
+    NE1_3_1 = C4*NE1_4_1 + RL4*FDI3_4_1 + N1_3_1 - S4*NE2_4_1
+    NE2_3_1 = NE3_4_1 + N2_3_1 - D4*FDI3_4_1
+    NE3_3_1 = D4*E3_4_1 + N3_3_1 - S4*NE1_4_1 - C4*NE2_4_1 - RL4*FDI1_4_1
+    FDI2_3_1 = C2m7*FDI1_4_1 + S2m7*E3_4_1
+    # Joint 2
+    F3_2_1 = MX2R*C2 - MY2*S2
+    E3_2_1 = E3_3_1 + F3_2_1
+    N3_2_1 = -YZ2R*C2 - XZ2R*S2
+    N1_2_1 = MY2*D2 - XX2R*S2 - XY2R*C2
+    N2_2_1 = -XY2R*S2 - MX2R*D2
+    NE1_2_1 = S2m7*NE1_3_1 + N1_2_1 - C2m7*NE2_3_1
+    NE2_2_1 = C2m7*NE1_3_1 + S2m7*NE2_3_1 + N2_2_1 - D3*E3_3_1
+    NE3_2_1 = NE3_3_1 + D3*FDI2_3_1 + N3_2_1
+    # Joint 1
+    NE3_1_1 = ZZ1R + D2*E3_7_1 + D2*E3_2_1 - S7*NE1_7_1 - C7*NE2_7_1 - S2*NE1_2_1 - C2*NE2_2_1
+    # Link 3
+    VP1_3_2 = D3*C2m7
+    VP2_3_2 = D3*S2m7
+    # Link 4
+    VP1_4_2 = C4*VP1_3_2
+    VP2_4_2 = -S4*VP1_3_2
+    # Link 5
+    VP1_5_2 = C5*VP1_4_2 + S5*VP2_3_2
+    VP2_5_2 = C5*VP2_3_2 - S5*VP1_4_2
+    # Link 6
+    VP1_6_2 = C6*VP1_5_2 + S6*VP2_4_2
+    VP2_6_2 = C6*VP2_4_2 - S6*VP1_5_2
+    # Joint 8
+    FDI2_8_2 = -MY8*S2m7
+    NE3_7_2 = D8*FDI2_8_2
+    # Joint 6
+    N1_6_2 = MY6*VP2_5_2
+    N2_6_2 = -MX6*VP2_5_2
+    N3_6_2 = MX6*VP2_6_2 - MY6*VP1_6_2
+    # Joint 5
+    N1_5_2 = -MY5R*VP2_4_2
+    N2_5_2 = MX5*VP2_4_2
+    N3_5_2 = MX5*VP2_5_2 - MY5R*VP1_5_2
+    NE1_5_2 = C6*N1_6_2 + N1_5_2 - S6*N2_6_2
+    NE2_5_2 = N3_6_2 + N2_5_2
+    NE3_5_2 = N3_5_2 - S6*N1_6_2 - C6*N2_6_2
+    # Joint 4
+    N1_4_2 = MY4R*VP2_3_2
+    N2_4_2 = -MX4*VP2_3_2
+    N3_4_2 = MX4*VP2_4_2 - MY4R*VP1_4_2
+    NE1_4_2 = C5*NE1_5_2 + N1_4_2 - S5*NE2_5_2
+    NE2_4_2 = N2_4_2 - NE3_5_2
+    NE3_4_2 = S5*NE1_5_2 + C5*NE2_5_2 + N3_4_2
+    # Joint 3
+    N3_3_2 = MX3R*VP2_3_2 - MY3R*VP1_3_2
+    NE3_3_2 = N3_3_2 - S4*NE1_4_2 - C4*NE2_4_2
+    # Joint 2
+    NE3_2_2 = ZZ2R + NE3_3_2
+    # Link 6
+    WP1_6_4 = S5*C6
+    WP2_6_4 = -S5*S6
+    # Joint 6
+    F1_6_4 = -MY6*C5
+    F2_6_4 = MX6*C5
+    F3_6_4 = MY6*WP1_6_4 - MX6*WP2_6_4
+    N1_6_4 = XX6R*WP1_6_4 + XZ6*C5 + XY6*WP2_6_4
+    N2_6_4 = XY6*WP1_6_4 + YZ6*C5
+    N3_6_4 = ZZ6*C5 + YZ6*WP2_6_4 + XZ6*WP1_6_4
+    FDI1_6_4 = C6*F1_6_4 - S6*F2_6_4
+    FDI3_6_4 = -S6*F1_6_4 - C6*F2_6_4
+    # Joint 5
+    MY5RS5 = MY5R*S5
+    F3_5_4 = MY5RS5 - MX5*C5
+    E3_5_4 = FDI3_6_4 + F3_5_4
+    N1_5_4 = XX5R*S5 + XY5*C5
+    N2_5_4 = XY5*S5
+    N3_5_4 = YZ5*C5 + XZ5*S5
+    NE1_5_4 = C6*N1_6_4 + N1_5_4 - S6*N2_6_4
+    NE2_5_4 = N3_6_4 + N2_5_4
+    NE3_5_4 = N3_5_4 - S6*N1_6_4 - C6*N2_6_4
+    FDI1_5_4 = C5*FDI1_6_4 - S5*F3_6_4
+    FDI3_5_4 = S5*FDI1_6_4 + C5*F3_6_4
+    # Joint 4
+    E1_4_4 = FDI1_5_4 - MY4R
+    E2_4_4 = MX4 - E3_5_4
+    NE1_4_4 = XZ4 + C5*NE1_5_4 - S5*NE2_5_4
+    NE2_4_4 = YZ4 - NE3_5_4
+    NE3_4_4 = ZZ4R + S5*NE1_5_4 + C5*NE2_5_4
+    FDI1_4_4 = C4*E1_4_4 - S4*E2_4_4
+    NE3_3_4 = D4*FDI3_5_4 - S4*NE1_4_4 - C4*NE2_4_4 - RL4*FDI1_4_4
+    # Joint 6
+    F3_6_5 = MX6*C6 - MY6*S6
+    N1_6_5 = -XX6R*S6 - XY6*C6
+    N2_6_5 = -XY6*S6
+    N3_6_5 = -YZ6*C6 - XZ6*S6
+    # Joint 5
+    E2_5_5 = MX5 + F3_6_5
+    NE1_5_5 = XZ5 + C6*N1_6_5 - S6*N2_6_5
+    NE2_5_5 = YZ5 + N3_6_5
+    NE3_5_5 = ZZ5R - S6*N1_6_5 - C6*N2_6_5
+    FDI1_5_5 = -MY5R*C5 - S5*E2_5_5
+    FDI3_5_5 = C5*E2_5_5 - MY5RS5
+    NE1_4_5 = C5*NE1_5_5 - S5*NE2_5_5
+    # Joint 4
+    FDI1_4_5 = C4*FDI1_5_5
+    NE3_3_5 = C4*NE3_5_5 + D4*FDI3_5_5 - S4*NE1_4_5 - RL4*FDI1_4_5
+    # Joint 6
+    FDI1_6_6 = -MY6*C6 - MX6*S6
+    NE1_5_6 = XZ6*C6 - YZ6*S6
+    # Joint 5
+    FDI1_5_6 = C5*FDI1_6_6
+    FDI3_5_6 = S5*FDI1_6_6
+    NE1_4_6 = C5*NE1_5_6 - ZZ6*S5
+    # Joint 4
+    FDI1_4_6 = C4*FDI1_5_6 - S4*F3_6_5
+    NE3_3_6 = C4*N3_6_5 + D4*FDI3_5_6 - S4*NE1_4_6 - RL4*FDI1_4_6
+    # Link 4
+    VP1_4_7 = -RL4*C4
+    VP2_4_7 = RL4*S4
+    # Link 5
+    WP1_5_7 = -S4*C5
+    WP2_5_7 = S4*S5
+    VP1_5_7 = C5*VP1_4_7 + D4*S5
+    VP2_5_7 = D4*C5 - S5*VP1_4_7
+    # Link 6
+    WP1_6_7 = C6*WP1_5_7 - C4*S6
+    WP2_6_7 = -C4*C6 - S6*WP1_5_7
+    VP1_6_7 = C6*VP1_5_7 + S6*VP2_4_7
+    VP2_6_7 = C6*VP2_4_7 - S6*VP1_5_7
+    # Joint 6
+    F1_6_7 = -MY6*WP2_5_7
+    F2_6_7 = MX6*WP2_5_7
+    F3_6_7 = MY6*WP1_6_7 - MX6*WP2_6_7
+    N1_6_7 = XX6R*WP1_6_7 + XZ6*WP2_5_7 + XY6*WP2_6_7 + MY6*VP2_5_7
+    N2_6_7 = XY6*WP1_6_7 + YZ6*WP2_5_7 - MX6*VP2_5_7
+    N3_6_7 = ZZ6*WP2_5_7 + YZ6*WP2_6_7 + XZ6*WP1_6_7 + MX6*VP2_6_7 - MY6*VP1_6_7
+    FDI1_6_7 = C6*F1_6_7 - S6*F2_6_7
+    FDI3_6_7 = -S6*F1_6_7 - C6*F2_6_7
+    # Joint 5
+    F1_5_7 = -MY5R*C4
+    F2_5_7 = MX5*C4
+    F3_5_7 = MY5R*WP1_5_7 - MX5*WP2_5_7
+    E1_5_7 = FDI1_6_7 + F1_5_7
+    E2_5_7 = F3_6_7 + F2_5_7
+    E3_5_7 = FDI3_6_7 + F3_5_7
+    N1_5_7 = XX5R*WP1_5_7 + XZ5*C4 + XY5*WP2_5_7 - MY5R*VP2_4_7
+    N2_5_7 = XY5*WP1_5_7 + YZ5*C4 + MX5*VP2_4_7
+    N3_5_7 = ZZ5R*C4 + YZ5*WP2_5_7 + XZ5*WP1_5_7 + MX5*VP2_5_7 - MY5R*VP1_5_7
+    NE1_5_7 = C6*N1_6_7 + N1_5_7 - S6*N2_6_7
+    NE2_5_7 = N3_6_7 + N2_5_7
+    NE3_5_7 = N3_5_7 - S6*N1_6_7 - C6*N2_6_7
+    FDI1_5_7 = C5*E1_5_7 - S5*E2_5_7
+    FDI3_5_7 = S5*E1_5_7 + C5*E2_5_7
+    # Joint 4
+    F3_4_7 = MX4*C4 - MY4R*S4
+    E3_4_7 = FDI3_5_7 + F3_4_7
+    N1_4_7 = MY4R*D4 - XX4R*S4 - XY4*C4
+    N2_4_7 = -XY4*S4 - MX4*D4
+    NE1_4_7 = C5*NE1_5_7 + N1_4_7 - S5*NE2_5_7
+    NE2_4_7 = N2_4_7 - NE3_5_7
+    FDI1_4_7 = C4*FDI1_5_7 + S4*E3_5_7
+    # Joint 3
+    NE3_3_7 = ZZ3R + D4*E3_4_7 - S4*NE1_4_7 - C4*NE2_4_7 - RL4*FDI1_4_7
+    # Inertia matrix
+    A[0, 0] = NE3_1_1
+    A[1, 0] = A[0, 1] = NE3_2_1 - NE3_3_1
+    A[2, 0] = A[0, 2] = NE3_4_1
+    A[3, 0] = A[0, 3] = NE3_5_1
+    A[4, 0] = A[0, 4] = N3_6_1
+    A[5, 0] = A[0, 5] = NE3_3_1
+    A[1, 1] = NE3_2_2 - NE3_3_2
+    A[2, 1] = A[1, 2] = NE3_4_2
+    A[3, 1] = A[1, 3] = NE3_5_2
+    A[4, 1] = A[1, 4] = N3_6_2
+    A[5, 1] = A[1, 5] = NE3_7_2 + NE3_3_2
+    A[2, 2] = Ia4 + NE3_4_4
+    A[3, 2] = A[2, 3] = NE3_5_4
+    A[4, 2] = A[2, 4] = N3_6_4
+    A[5, 2] = A[2, 5] = NE3_3_4
+    A[3, 3] = Ia5 + NE3_5_5
+    A[4, 3] = A[3, 4] = N3_6_5
+    A[5, 3] = A[3, 5] = NE3_3_5
+    A[4, 4] = ZZ6 + Ia6
+    A[5, 4] = A[4, 5] = NE3_3_6
+    A[5, 5] = NE3_3_7
+
+
+def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
+    """Fill GAM, shape (6, N), for qdd = 0. q, qd: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q4 = q[2]
+    q5 = q[3]
+    q6 = q[4]
+    q7 = q[5]
+    QP1, QP2, QP4, QP5, QP6, QP7 = qd
+    FV1 = X[1]
+    FS1 = X[2]
+    OFFSET1 = X[3]
+    XX2R = X[4]
+    XY2R = X[5]
+    XZ2R = X[6]
+    YZ2R = X[7]
+    ZZ2R = X[8]
+    MX2R = X[9]
+    MY2 = X[10]
+    FV2 = X[11]
+    FS2 = X[12]
+    OFFSET2 = X[13]
+    XX3R = X[14]
+    XY3R = X[15]
+    XZ3R = X[16]
+    YZ3R = X[17]
+    ZZ3R = X[18]
+    MX3R = X[19]
+    MY3R = X[20]
+    XX4R = X[21]
+    XY4 = X[22]
+    XZ4 = X[23]
+    YZ4 = X[24]
+    ZZ4R = X[25]
+    MX4 = X[26]
+    MY4R = X[27]
+    FV4 = X[29]
+    FS4 = X[30]
+    OFFSET4 = X[31]
+    XX5R = X[32]
+    XY5 = X[33]
+    XZ5 = X[34]
+    YZ5 = X[35]
+    ZZ5R = X[36]
+    MX5 = X[37]
+    MY5R = X[38]
+    FV5 = X[40]
+    FS5 = X[41]
+    OFFSET5 = X[42]
+    XX6R = X[43]
+    XY6 = X[44]
+    XZ6 = X[45]
+    YZ6 = X[46]
+    ZZ6 = X[47]
+    MX6 = X[48]
+    MY6 = X[49]
+    FV6 = X[51]
+    FS6 = X[52]
+    OFFSET6 = X[53]
+    MX7R = X[54]
+    MY7 = X[55]
+    FV7 = X[56]
+    FS7 = X[57]
+    OFFSET7 = X[58]
+    MY8 = X[59]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m7 = q2 - q7
+    C2m7 = np.cos(th2m7)
+    S2m7 = np.sin(th2m7)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 1
+    DV3_3_1 = QP1**2
+    # Link 2
+    W1_2 = -S2*QP1
+    W2_2 = -C2*QP1
+    WP1_2 = QP2*W2_2
+    WP2_2 = -QP2*W1_2
+    DV1_1_2 = W1_2**2
+    DV1_2_2 = W1_2*W2_2
+    DV2_2_2 = W2_2**2
+    DV3_3_2 = QP2**2
+    DW2_3_2 = DV2_2_2 - DV3_3_2
+    DW3_1_2 = DV3_3_2 - DV1_1_2
+    DW1_2_2 = DV1_1_2 - DV2_2_2
+    U1_1_2 = -DV2_2_2 - DV3_3_2
+    U2_2_2 = -DV1_1_2 - DV3_3_2
+    U3_1_2 = -2*WP2_2
+    U3_2_2 = 2*WP1_2
+    VSP1_2 = -D2*DV3_3_1
+    VP1_2 = C2*VSP1_2 - g*S2
+    VP2_2 = -g*C2 - S2*VSP1_2
+    # Link 3
+    W1_3 = -C7*QP1
+    W2_3 = S7*QP1
+    WP1_3 = QP7*W2_3
+    WP2_3 = -QP7*W1_3
+    DV1_1_3 = W1_3**2
+    DV1_2_3 = W1_3*W2_3
+    DV2_2_3 = W2_3**2
+    DV3_3_3 = QP7**2
+    DW2_3_3 = DV2_2_3 - DV3_3_3
+    DW3_1_3 = DV3_3_3 - DV1_1_3
+    DW1_2_3 = DV1_1_3 - DV2_2_3
+    U1_1_3 = -DV2_2_3 - DV3_3_3
+    U2_2_3 = -DV1_1_3 - DV3_3_3
+    U3_1_3 = -2*WP2_3
+    U3_2_3 = 2*WP1_3
+    VSP3_3 = D3*U3_1_2
+    VSP1_3 = VP1_2 + D3*U1_1_2
+    VSP2_3 = VP2_2 + D3*DV1_2_2
+    VP1_3 = S2m7*VSP1_3 + C2m7*VSP2_3
+    VP2_3 = S2m7*VSP2_3 - C2m7*VSP1_3
+    # Link 4
+    W1_4 = C4*W1_3 - S4*QP7
+    W2_4 = -C4*QP7 - S4*W1_3
+    W3_4 = QP4 + W2_3
+    WP1_4 = C4*WP1_3 + QP4*W2_4
+    WP2_4 = -S4*WP1_3 - QP4*W1_4
+    DV1_1_4 = W1_4**2
+    DV1_2_4 = W1_4*W2_4
+    DV1_3_4 = W1_4*W3_4
+    DV2_2_4 = W2_4**2
+    DV2_3_4 = W2_4*W3_4
+    DV3_3_4 = W3_4**2
+    DW2_3_4 = DV2_2_4 - DV3_3_4
+    DW3_1_4 = DV3_3_4 - DV1_1_4
+    DW1_2_4 = DV1_1_4 - DV2_2_4
+    U1_1_4 = -DV2_2_4 - DV3_3_4
+    U1_2_4 = DV1_2_4 - WP2_3
+    U1_3_4 = WP2_4 + DV1_3_4
+    U2_1_4 = WP2_3 + DV1_2_4
+    U2_2_4 = -DV1_1_4 - DV3_3_4
+    U2_3_4 = DV2_3_4 - WP1_4
+    U3_1_4 = DV1_3_4 - WP2_4
+    U3_2_4 = WP1_4 + DV2_3_4
+    VSP1_4 = VP1_3 + D4*U1_1_3 + RL4*DV1_2_3
+    VSP2_4 = VP2_3 + D4*DV1_2_3 + RL4*U2_2_3
+    VSP3_4 = VSP3_3 + D4*U3_1_3 + RL4*U3_2_3
+    VP1_4 = C4*VSP1_4 - S4*VSP3_4
+    VP2_4 = -C4*VSP3_4 - S4*VSP1_4
+    # Link 5
+    W1_5 = C5*W1_4 + S5*W3_4
+    W2_5 = C5*W3_4 - S5*W1_4
+    W3_5 = QP5 - W2_4
+    WP1_5 = C5*WP1_4 + S5*WP2_3 + QP5*W2_5
+    WP2_5 = C5*WP2_3 - S5*WP1_4 - QP5*W1_5
+    DV1_1_5 = W1_5**2
+    DV1_2_5 = W1_5*W2_5
+    DV1_3_5 = W1_5*W3_5
+    DV2_2_5 = W2_5**2
+    DV2_3_5 = W2_5*W3_5
+    DV3_3_5 = W3_5**2
+    DW2_3_5 = DV2_2_5 - DV3_3_5
+    DW3_1_5 = DV3_3_5 - DV1_1_5
+    DW1_2_5 = DV1_1_5 - DV2_2_5
+    U1_1_5 = -DV2_2_5 - DV3_3_5
+    U1_2_5 = WP2_4 + DV1_2_5
+    U1_3_5 = WP2_5 + DV1_3_5
+    U2_1_5 = DV1_2_5 - WP2_4
+    U2_2_5 = -DV1_1_5 - DV3_3_5
+    U2_3_5 = DV2_3_5 - WP1_5
+    U3_1_5 = DV1_3_5 - WP2_5
+    U3_2_5 = WP1_5 + DV2_3_5
+    VP1_5 = C5*VP1_4 + S5*VSP2_4
+    VP2_5 = C5*VSP2_4 - S5*VP1_4
+    # Link 6
+    W1_6 = C6*W1_5 - S6*W3_5
+    W2_6 = -C6*W3_5 - S6*W1_5
+    W3_6 = QP6 + W2_5
+    WP1_6 = C6*WP1_5 + S6*WP2_4 + QP6*W2_6
+    WP2_6 = C6*WP2_4 - S6*WP1_5 - QP6*W1_6
+    DV1_1_6 = W1_6**2
+    DV1_2_6 = W1_6*W2_6
+    DV1_3_6 = W1_6*W3_6
+    DV2_2_6 = W2_6**2
+    DV2_3_6 = W2_6*W3_6
+    DV3_3_6 = W3_6**2
+    DW2_3_6 = DV2_2_6 - DV3_3_6
+    DW3_1_6 = DV3_3_6 - DV1_1_6
+    DW1_2_6 = DV1_1_6 - DV2_2_6
+    U1_1_6 = -DV2_2_6 - DV3_3_6
+    U1_2_6 = DV1_2_6 - WP2_5
+    U1_3_6 = WP2_6 + DV1_3_6
+    U2_1_6 = WP2_5 + DV1_2_6
+    U2_2_6 = -DV1_1_6 - DV3_3_6
+    U2_3_6 = DV2_3_6 - WP1_6
+    U3_1_6 = DV1_3_6 - WP2_6
+    U3_2_6 = WP1_6 + DV2_3_6
+    VP1_6 = C6*VP1_5 + S6*VP2_4
+    VP2_6 = C6*VP2_4 - S6*VP1_5
+    # Link 7
+    VP1_7 = C7*VSP1_2 - g*S7
+    VP2_7 = -g*C7 - S7*VSP1_2
+    # Link 8
+    VSP3_8 = -D8*U3_2_3
+    VSP1_8 = VP1_7 + D8*U2_2_3
+    VSP2_8 = VP2_7 - D8*DV1_2_3
+    VP1_8 = C2m7*VSP1_8 + S2m7*VSP2_8
+    # Joint 8
+    F1_8 = MY8*DV1_2_2
+    F2_8 = MY8*U2_2_2
+    F3_8 = MY8*U3_2_2
+    N1_8 = MY8*VSP3_8
+    N3_8 = -MY8*VP1_8
+    FDI2_8 = S2m7*F1_8 + C2m7*F2_8
+    NE1_7 = C2m7*N1_8
+    NE2_7 = S2m7*N1_8 - D8*F3_8
+    # Joint 7
+    F3_7 = MY7*U3_1_3 - MX7R*U3_2_3
+    E3_7 = F3_8 + F3_7
+    N3_7 = MX7R*VP2_7 - MY7*VP1_7
+    NE3_7 = N3_8 + D8*FDI2_8 + N3_7
+    # Joint 6
+    F1_6 = MX6*U1_1_6 + MY6*U1_2_6
+    F2_6 = MX6*U2_1_6 + MY6*U2_2_6
+    F3_6 = MX6*U3_1_6 + MY6*U3_2_6
+    N1_6 = XX6R*WP1_6 + ZZ6*DV2_3_6 + YZ6*DW2_3_6 + XZ6*U2_1_6 + MY6*VP2_5 - XY6*U3_1_6
+    N2_6 = (XX6R - ZZ6)*DV1_3_6 + XZ6*DW3_1_6 + XY6*U3_2_6 - YZ6*U1_2_6 - MX6*VP2_5
+    N3_6 = ZZ6*WP2_5 + XY6*DW1_2_6 + YZ6*U1_3_6 + MX6*VP2_6 - XX6R*DV1_2_6 - XZ6*U2_3_6 - MY6*VP1_6
+    FDI1_6 = C6*F1_6 - S6*F2_6
+    FDI3_6 = -S6*F1_6 - C6*F2_6
+    # Joint 5
+    F1_5 = MX5*U1_1_5 + MY5R*U1_2_5
+    F2_5 = MX5*U2_1_5 + MY5R*U2_2_5
+    F3_5 = MX5*U3_1_5 + MY5R*U3_2_5
+    E1_5 = FDI1_6 + F1_5
+    E2_5 = F3_6 + F2_5
+    E3_5 = FDI3_6 + F3_5
+    N1_5 = XX5R*WP1_5 + ZZ5R*DV2_3_5 + YZ5*DW2_3_5 + XZ5*U2_1_5 - XY5*U3_1_5 - MY5R*VP2_4
+    N2_5 = (XX5R - ZZ5R)*DV1_3_5 + XZ5*DW3_1_5 + XY5*U3_2_5 + MX5*VP2_4 - YZ5*U1_2_5
+    N3_5 = XY5*DW1_2_5 + YZ5*U1_3_5 + MX5*VP2_5 - ZZ5R*WP2_4 - XX5R*DV1_2_5 - XZ5*U2_3_5 - MY5R*VP1_5
+    NE1_5 = C6*N1_6 + N1_5 - S6*N2_6
+    NE2_5 = N3_6 + N2_5
+    NE3_5 = N3_5 - S6*N1_6 - C6*N2_6
+    FDI1_5 = C5*E1_5 - S5*E2_5
+    FDI3_5 = S5*E1_5 + C5*E2_5
+    # Joint 4
+    F1_4 = MX4*U1_1_4 + MY4R*U1_2_4
+    F2_4 = MX4*U2_1_4 + MY4R*U2_2_4
+    F3_4 = MX4*U3_1_4 + MY4R*U3_2_4
+    E1_4 = FDI1_5 + F1_4
+    E2_4 = F2_4 - E3_5
+    E3_4 = FDI3_5 + F3_4
+    N1_4 = XX4R*WP1_4 + ZZ4R*DV2_3_4 + YZ4*DW2_3_4 + XZ4*U2_1_4 + MY4R*VSP2_4 - XY4*U3_1_4
+    N2_4 = (XX4R - ZZ4R)*DV1_3_4 + XZ4*DW3_1_4 + XY4*U3_2_4 - YZ4*U1_2_4 - MX4*VSP2_4
+    N3_4 = ZZ4R*WP2_3 + XY4*DW1_2_4 + YZ4*U1_3_4 + MX4*VP2_4 - XX4R*DV1_2_4 - XZ4*U2_3_4 - MY4R*VP1_4
+    NE1_4 = C5*NE1_5 + N1_4 - S5*NE2_5
+    NE2_4 = N2_4 - NE3_5
+    NE3_4 = S5*NE1_5 + C5*NE2_5 + N3_4
+    FDI1_4 = C4*E1_4 - S4*E2_4
+    FDI3_4 = -S4*E1_4 - C4*E2_4
+    # Joint 3
+    F1_3 = MX3R*U1_1_3 + MY3R*DV1_2_3
+    F2_3 = MX3R*DV1_2_3 + MY3R*U2_2_3
+    F3_3 = MX3R*U3_1_3 + MY3R*U3_2_3
+    E1_3 = FDI1_4 + F1_3
+    E2_3 = E3_4 + F2_3
+    E3_3 = FDI3_4 + F3_3
+    N1_3 = XX3R*WP1_3 + ZZ3R*WP1_3 + YZ3R*DW2_3_3 + XZ3R*DV1_2_3 + MY3R*VSP3_3 - XY3R*U3_1_3
+    N2_3 = XZ3R*DW3_1_3 + XY3R*U3_2_3 - (XX3R - ZZ3R)*WP2_3 - YZ3R*DV1_2_3 - MX3R*VSP3_3
+    N3_3 = XY3R*DW1_2_3 + MX3R*VP2_3 - XX3R*DV1_2_3 - MY3R*VP1_3
+    NE1_3 = C4*NE1_4 + RL4*FDI3_4 + N1_3 - S4*NE2_4
+    NE2_3 = NE3_4 + N2_3 - D4*FDI3_4
+    NE3_3 = D4*E3_4 + N3_3 - S4*NE1_4 - C4*NE2_4 - RL4*FDI1_4
+    FDI2_3 = C2m7*E1_3 + S2m7*E2_3
+    # Joint 2
+    F3_2 = MX2R*U3_1_2 + MY2*U3_2_2
+    E3_2 = E3_3 + F3_2
+    N1_2 = XX2R*WP1_2 + ZZ2R*WP1_2 + YZ2R*DW2_3_2 + XZ2R*DV1_2_2 - XY2R*U3_1_2
+    N2_2 = XZ2R*DW3_1_2 + XY2R*U3_2_2 - (XX2R - ZZ2R)*WP2_2 - YZ2R*DV1_2_2
+    N3_2 = XY2R*DW1_2_2 + MX2R*VP2_2 - XX2R*DV1_2_2 - MY2*VP1_2
+    NE1_2 = S2m7*NE1_3 + N1_2 - C2m7*NE2_3
+    NE2_2 = C2m7*NE1_3 + S2m7*NE2_3 + N2_2 - D3*E3_3
+    NE3_2 = NE3_3 + D3*FDI2_3 + N3_2
+    NE3_1 = D2*E3_7 + D2*E3_2 - S7*NE1_7 - C7*NE2_7 - S2*NE1_2 - C2*NE2_2
+    # Torques
+    GAM[0] = OFFSET1 + NE3_1 + FV1*QP1 + FS1*np.sign(QP1)
+    GAM[1] = OFFSET2 + NE3_2 + FV2*QP2 + FS2*np.sign(QP2) + N3_8 - NE3_3
+    GAM[2] = OFFSET4 + NE3_4 + FV4*QP4 + FS4*np.sign(QP4)
+    GAM[3] = OFFSET5 + NE3_5 + FV5*QP5 + FS5*np.sign(QP5)
+    GAM[4] = OFFSET6 + N3_6 + FV6*QP6 + FS6*np.sign(QP6)
+    GAM[5] = NE3_3 + OFFSET7 + NE3_7 + FV7*QP7 + FS7*np.sign(QP7) - N3_8
+
+
+def _gravity_block(q, GAM, X, D2, D3, D4, RL4, D8, g):
+    """Fill GAM, shape (6, N), at rest. q: (6, N)."""
+    # Inputs
+    q2 = q[1]
+    q4 = q[2]
+    q5 = q[3]
+    q6 = q[4]
+    q7 = q[5]
+    OFFSET1 = X[3]
+    MX2R = X[9]
+    MY2 = X[10]
+    OFFSET2 = X[13]
+    MX3R = X[19]
+    MY3R = X[20]
+    MX4 = X[26]
+    MY4R = X[27]
+    OFFSET4 = X[31]
+    MX5 = X[37]
+    MY5R = X[38]
+    OFFSET5 = X[42]
+    MX6 = X[48]
+    MY6 = X[49]
+    OFFSET6 = X[53]
+    MX7R = X[54]
+    MY7 = X[55]
+    OFFSET7 = X[58]
+    MY8 = X[59]
+    # Trigonometry
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    th2m7 = q2 - q7
+    C2m7 = np.cos(th2m7)
+    S2m7 = np.sin(th2m7)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Link 2
+    VP1_2 = -g*S2
+    VP2_2 = -g*C2
+    # Link 3
+    VP1_3 = S2m7*VP1_2 + C2m7*VP2_2
+    VP2_3 = S2m7*VP2_2 - C2m7*VP1_2
+    # Link 4
+    VP1_4 = C4*VP1_3
+    VP2_4 = -S4*VP1_3
+    # Link 5
+    VP1_5 = C5*VP1_4 + S5*VP2_3
+    VP2_5 = C5*VP2_3 - S5*VP1_4
+    # Link 6
+    VP1_6 = C6*VP1_5 + S6*VP2_4
+    VP2_6 = C6*VP2_4 - S6*VP1_5
+    # Link 7
+    VP1_7 = -g*S7
+    VP2_7 = -g*C7
+    # Link 8
+    VP1_8 = C2m7*VP1_7 + S2m7*VP2_7
+    # Joint 8
+    N3_8 = -MY8*VP1_8
+    # Joint 7
+    N3_7 = MX7R*VP2_7 - MY7*VP1_7
+    NE3_7 = N3_8 + N3_7
+    # Joint 6
+    N1_6 = MY6*VP2_5
+    N2_6 = -MX6*VP2_5
+    N3_6 = MX6*VP2_6 - MY6*VP1_6
+    # Joint 5
+    N1_5 = -MY5R*VP2_4
+    N2_5 = MX5*VP2_4
+    N3_5 = MX5*VP2_5 - MY5R*VP1_5
+    NE1_5 = C6*N1_6 + N1_5 - S6*N2_6
+    NE2_5 = N3_6 + N2_5
+    NE3_5 = N3_5 - S6*N1_6 - C6*N2_6
+    # Joint 4
+    N1_4 = MY4R*VP2_3
+    N2_4 = -MX4*VP2_3
+    N3_4 = MX4*VP2_4 - MY4R*VP1_4
+    NE1_4 = C5*NE1_5 + N1_4 - S5*NE2_5
+    NE2_4 = N2_4 - NE3_5
+    NE3_4 = S5*NE1_5 + C5*NE2_5 + N3_4
+    NE1_3 = C4*NE1_4 - S4*NE2_4
+    # Joint 3
+    N3_3 = MX3R*VP2_3 - MY3R*VP1_3
+    NE3_3 = N3_3 - S4*NE1_4 - C4*NE2_4
+    NE1_2 = S2m7*NE1_3 - C2m7*NE3_4
+    NE2_2 = C2m7*NE1_3 + S2m7*NE3_4
+    # Joint 2
+    N3_2 = MX2R*VP2_2 - MY2*VP1_2
+    NE3_2 = NE3_3 + N3_2
+    NE3_1 = -S2*NE1_2 - C2*NE2_2
+    # Torques
+    GAM[0] = OFFSET1 + NE3_1
+    GAM[1] = OFFSET2 + NE3_2 + N3_8 - NE3_3
+    GAM[2] = OFFSET4 + NE3_4
+    GAM[3] = OFFSET5 + NE3_5
+    GAM[4] = OFFSET6 + N3_6
+    GAM[5] = NE3_3 + OFFSET7 + NE3_7 - N3_8
+
+
+def _frame_poses_block(q, T, D2, D3, D4, RL4, D8, g):
+    """Fill T, shape (10, 4, 4, N). q: (6, N)."""
+    # Inputs
+    q1, q2, q4, q5, q6, q7 = q
+    # Trigonometry
+    C1 = np.cos(q1)
+    S1 = np.sin(q1)
+    C2 = np.cos(q2)
+    S2 = np.sin(q2)
+    C7 = np.cos(q7)
+    S7 = np.sin(q7)
+    C4 = np.cos(q4)
+    S4 = np.sin(q4)
+    C5 = np.cos(q5)
+    S5 = np.sin(q5)
+    C6 = np.cos(q6)
+    S6 = np.sin(q6)
+    # Frame 2
+    R1_1_2 = C1*C2
+    R1_2_2 = -C1*S2
+    R2_1_2 = S1*C2
+    R2_2_2 = -S1*S2
+    P1_2 = D2*C1
+    P2_2 = D2*S1
+    # Frame 3
+    R1_1_3 = -C1*S7
+    R1_2_3 = -C1*C7
+    R2_1_3 = -S1*S7
+    R2_2_3 = -S1*C7
+    D3R1_1_2 = D3*R1_1_2
+    P1_3 = P1_2 + D3R1_1_2
+    D3R2_1_2 = D3*R2_1_2
+    P2_3 = P2_2 + D3R2_1_2
+    P3_3 = -D3*S2
+    # Frame 4
+    R1_1_4 = C4*R1_1_3 + S1*S4
+    R1_2_4 = S1*C4 - S4*R1_1_3
+    R2_1_4 = C4*R2_1_3 - C1*S4
+    R2_2_4 = -C1*C4 - S4*R2_1_3
+    R3_1_4 = -C7*C4
+    R3_2_4 = C7*S4
+    P1_4 = P1_3 + D4*R1_1_3 + RL4*R1_2_3
+    P2_4 = P2_3 + D4*R2_1_3 + RL4*R2_2_3
+    P3_4 = P3_3 + RL4*S7 - D4*C7
+    # Frame 5
+    R1_1_5 = C5*R1_1_4 + S5*R1_2_3
+    R1_2_5 = C5*R1_2_3 - S5*R1_1_4
+    R2_1_5 = C5*R2_1_4 + S5*R2_2_3
+    R2_2_5 = C5*R2_2_3 - S5*R2_1_4
+    R3_1_5 = C5*R3_1_4 + S7*S5
+    R3_2_5 = S7*C5 - S5*R3_1_4
+    # Frame 6
+    R1_1_6 = C6*R1_1_5 + S6*R1_2_4
+    R1_2_6 = C6*R1_2_4 - S6*R1_1_5
+    R2_1_6 = C6*R2_1_5 + S6*R2_2_4
+    R2_2_6 = C6*R2_2_4 - S6*R2_1_5
+    R3_1_6 = C6*R3_1_5 + S6*R3_2_4
+    R3_2_6 = C6*R3_2_4 - S6*R3_1_5
+    # Frame 8
+    D8R1_2_3 = D8*R1_2_3
+    P1_8 = P1_2 - D8R1_2_3
+    D8R2_2_3 = D8*R2_2_3
+    P2_8 = P2_2 - D8R2_2_3
+    P3_8 = -D8*S7
+    # Frame 9
+    P1_9 = D3R1_1_2 + P1_8
+    P2_9 = D3R2_1_2 + P2_8
+    P3_9 = P3_3 + P3_8
+    # Frame 10
+    P1_10 = P1_3 - D8R1_2_3
+    P2_10 = P2_3 - D8R2_2_3
+    # Poses
+    T[0, 0, 0] = C1
+    T[0, 0, 1] = -S1
+    T[0, 0, 2] = 0.0
+    T[0, 1, 0] = S1
+    T[0, 1, 1] = C1
+    T[0, 1, 2] = 0.0
+    T[0, 2, 0] = 0.0
+    T[0, 2, 1] = 0.0
+    T[0, 2, 2] = 1.0
+    T[0, 0, 3] = 0.0
+    T[0, 1, 3] = 0.0
+    T[0, 2, 3] = 0.0
+    T[1, 0, 0] = R1_1_2
+    T[1, 0, 1] = R1_2_2
+    T[1, 0, 2] = -S1
+    T[1, 1, 0] = R2_1_2
+    T[1, 1, 1] = R2_2_2
+    T[1, 1, 2] = C1
+    T[1, 2, 0] = -S2
+    T[1, 2, 1] = -C2
+    T[1, 2, 2] = 0.0
+    T[1, 0, 3] = P1_2
+    T[1, 1, 3] = P2_2
+    T[1, 2, 3] = 0.0
+    T[2, 0, 0] = R1_1_3
+    T[2, 0, 1] = R1_2_3
+    T[2, 0, 2] = -S1
+    T[2, 1, 0] = R2_1_3
+    T[2, 1, 1] = R2_2_3
+    T[2, 1, 2] = C1
+    T[2, 2, 0] = -C7
+    T[2, 2, 1] = S7
+    T[2, 2, 2] = 0.0
+    T[2, 0, 3] = P1_3
+    T[2, 1, 3] = P2_3
+    T[2, 2, 3] = P3_3
+    T[3, 0, 0] = R1_1_4
+    T[3, 0, 1] = R1_2_4
+    T[3, 0, 2] = R1_2_3
+    T[3, 1, 0] = R2_1_4
+    T[3, 1, 1] = R2_2_4
+    T[3, 1, 2] = R2_2_3
+    T[3, 2, 0] = R3_1_4
+    T[3, 2, 1] = R3_2_4
+    T[3, 2, 2] = S7
+    T[3, 0, 3] = P1_4
+    T[3, 1, 3] = P2_4
+    T[3, 2, 3] = P3_4
+    T[4, 0, 0] = R1_1_5
+    T[4, 0, 1] = R1_2_5
+    T[4, 0, 2] = -R1_2_4
+    T[4, 1, 0] = R2_1_5
+    T[4, 1, 1] = R2_2_5
+    T[4, 1, 2] = -R2_2_4
+    T[4, 2, 0] = R3_1_5
+    T[4, 2, 1] = R3_2_5
+    T[4, 2, 2] = -R3_2_4
+    T[4, 0, 3] = P1_4
+    T[4, 1, 3] = P2_4
+    T[4, 2, 3] = P3_4
+    T[5, 0, 0] = R1_1_6
+    T[5, 0, 1] = R1_2_6
+    T[5, 0, 2] = R1_2_5
+    T[5, 1, 0] = R2_1_6
+    T[5, 1, 1] = R2_2_6
+    T[5, 1, 2] = R2_2_5
+    T[5, 2, 0] = R3_1_6
+    T[5, 2, 1] = R3_2_6
+    T[5, 2, 2] = R3_2_5
+    T[5, 0, 3] = P1_4
+    T[5, 1, 3] = P2_4
+    T[5, 2, 3] = P3_4
+    T[6, 0, 0] = -R1_2_3
+    T[6, 0, 1] = R1_1_3
+    T[6, 0, 2] = -S1
+    T[6, 1, 0] = -R2_2_3
+    T[6, 1, 1] = R2_1_3
+    T[6, 1, 2] = C1
+    T[6, 2, 0] = -S7
+    T[6, 2, 1] = -C7
+    T[6, 2, 2] = 0.0
+    T[6, 0, 3] = P1_2
+    T[6, 1, 3] = P2_2
+    T[6, 2, 3] = 0.0
+    T[7, 0, 0] = R1_1_2
+    T[7, 0, 1] = R1_2_2
+    T[7, 0, 2] = -S1
+    T[7, 1, 0] = R2_1_2
+    T[7, 1, 1] = R2_2_2
+    T[7, 1, 2] = C1
+    T[7, 2, 0] = -S2
+    T[7, 2, 1] = -C2
+    T[7, 2, 2] = 0.0
+    T[7, 0, 3] = P1_8
+    T[7, 1, 3] = P2_8
+    T[7, 2, 3] = P3_8
+    T[8, 0, 0] = R1_2_3
+    T[8, 0, 1] = -R1_1_3
+    T[8, 0, 2] = -S1
+    T[8, 1, 0] = R2_2_3
+    T[8, 1, 1] = -R2_1_3
+    T[8, 1, 2] = C1
+    T[8, 2, 0] = S7
+    T[8, 2, 1] = C7
+    T[8, 2, 2] = 0.0
+    T[8, 0, 3] = P1_9
+    T[8, 1, 3] = P2_9
+    T[8, 2, 3] = P3_9
+    T[9, 0, 0] = R1_2_3
+    T[9, 0, 1] = -R1_1_3
+    T[9, 0, 2] = -S1
+    T[9, 1, 0] = R2_2_3
+    T[9, 1, 1] = -R2_1_3
+    T[9, 1, 2] = C1
+    T[9, 2, 0] = S7
+    T[9, 2, 1] = C7
+    T[9, 2, 2] = 0.0
+    T[9, 0, 3] = P1_10
+    T[9, 1, 3] = P2_10
+    T[9, 2, 3] = P3_9

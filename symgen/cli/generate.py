@@ -1,0 +1,69 @@
+"""`symgen generate ROBOT...`: derive, regroup, emit; `--check` compares with the files that are there."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from symgen.cli.session import NEGATIVE, fail, reported_errors
+from symgen.cli.writing import write_all
+
+TARGETS = ("numpy",)
+
+
+def generate(
+    robots: Annotated[
+        list[str], typer.Argument(metavar="ROBOT...", help="Packaged robots or robot files (.yaml); `all` for every packaged one.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the modules.")] = Path("generated"),
+    target: Annotated[str, typer.Option(help="What to emit: numpy.")] = "numpy",
+    check: Annotated[bool, typer.Option("--check", help="Write nothing; fail with a diff where a module is not current.")] = False,
+) -> None:
+    """Derive the models of each ROBOT and write them as OUTPUT/<name>.py. All are written, or none."""
+    with reported_errors():
+        if target not in TARGETS:
+            fail(f"target {target!r}; there is {', '.join(TARGETS)}")
+        modules = emitted(robots)
+        if check:
+            report_differences(output, modules)
+            return
+        for path in write_all(output, modules):
+            typer.echo(f"{path}")
+
+
+def emitted(robots: list[str]) -> dict[str, str]:
+    """{file name: text} of every robot. Raises SymgenError before anything is written."""
+    from symgen.description import load_robot, packaged_robots
+    from symgen.emit import generate_module
+
+    modules: dict[str, str] = {}
+    for source in packaged_robots() if robots == ["all"] else robots:
+        robot = load_robot(source)
+        name = f"{robot.name}.py"
+        if name in modules:
+            fail(f"two robots are called {robot.name}; their modules would overwrite each other")
+        modules[name] = generate_module(robot, command=Path(source).name if source.endswith((".yaml", ".yml")) else source)
+    return modules
+
+
+def report_differences(output: Path, modules: dict[str, str]) -> None:
+    """Print a unified diff of every module that is not what would be written; exit code 1 if there is one."""
+    stale = []
+    for name, text in modules.items():
+        path = output / name
+        if not path.is_file():
+            stale.append(path)
+            typer.echo(f"{path} is missing")
+            continue
+        found = path.read_text(encoding="utf-8")
+        if found != text:
+            stale.append(path)
+            lines = difflib.unified_diff(found.splitlines(True), text.splitlines(True), f"{path} (found)", f"{path} (current)", n=1)
+            typer.echo("".join(list(lines)[:200]))
+    if stale:
+        typer.echo(f"not current: {', '.join(map(str, stale))}; run symgen generate", err=True)
+        raise typer.Exit(NEGATIVE)
+    typer.echo(f"{len(modules)} modules are current")

@@ -1,0 +1,64 @@
+"""The `symgen` command. Verbs are loaded when they are called, so that `symgen --help` starts at once."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command
+
+VERBS = {
+    "generate": "Derive a robot's models and write them as a module.",
+    "show": "Print the base parameters with their regrouping formulas.",
+    "check": "Verify the certificate of a robot's base parameters.",
+    "identify": "Estimate the base parameters from a measured record.",
+    "cestac": "Judge whether the encoder resolves enough for an identification.",
+    "datasets": "List the measured records this program knows, and where they lie.",
+    "new": "Write a skeleton robot file.",
+    "demo": "The main job end to end, with a report.",
+}
+
+
+class Verbs(TyperGroup):
+    """A group whose commands are modules symgen/cli/VERB.py with a function of that name; help needs none of them."""
+
+    listing = False
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name not in VERBS:
+            return None
+        if self.listing:
+            return TyperCommand(cmd_name, help=VERBS[cmd_name])
+        verb = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        verb.command(cmd_name)(getattr(import_module(f"symgen.cli.{cmd_name}"), cmd_name))
+        return get_command(verb)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        self.listing = True
+        super().format_help(ctx, formatter)
+
+
+app = typer.Typer(cls=Verbs, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from symgen.version import VERSION
+
+        typer.echo(f"symgen {VERSION}")
+        raise typer.Exit
+
+
+@app.callback()
+def symgen(version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version.")) -> None:
+    """Symbolic robot dynamics: from a robot file to formulas, from a record to parameters, and what the encoder allows."""
+
+
+def main() -> None:
+    """Entry point of the command line."""
+    app()

@@ -1,0 +1,26 @@
+"""`symgen new FILE`: a skeleton robot file to fill in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from symgen.cli.session import fail, reported_errors
+
+
+def new(file: Annotated[Path, typer.Argument(help="Robot file to create, e.g. my_arm.yaml.")]) -> None:
+    """Write a robot file with every section explained. Never overwrites."""
+    with reported_errors():
+        from symgen.description import skeleton
+
+        if file.suffix not in (".yaml", ".yml"):
+            fail(f"{file}: a robot file ends in .yaml")
+        text = skeleton(file.stem)
+        try:
+            with file.open("x", encoding="utf-8") as stream:
+                stream.write(text)
+        except FileExistsError:
+            fail(f"{file} exists already; choose another name or edit it")
+        typer.echo(f"{file}: edit it, then\n  symgen show {file}\n  symgen generate {file} -o generated")

@@ -1,0 +1,141 @@
+"""`symgen show ROBOT`: base parameters with their regrouping formulas, as text, LaTeX or JSON."""
+
+from __future__ import annotations
+
+import difflib
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from symgen.cli.session import fail, reported_errors
+
+if TYPE_CHECKING:
+    from symgen.regroup.regrouping import BaseParameter, Regrouping
+
+FORMATS = ("text", "latex", "json")
+
+
+def show(
+    robot: Annotated[str, typer.Argument(help="Packaged robot or robot file (.yaml).")],
+    format: Annotated[str, typer.Option(help="text, latex or json.")] = "text",
+    only: Annotated[str | None, typer.Option(help="One base parameter, e.g. XX2R.")] = None,
+    recursive: Annotated[bool, typer.Option("--recursive", help="Link by link, as SYMORO prints, instead of flat as eq. (27).")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Same as --format json.")] = False,
+) -> None:
+    """Print the base parameters of ROBOT, what they are made of, what has no effect, and what the models cost."""
+    with reported_errors():
+        kind = "json" if json else format
+        if kind not in FORMATS:
+            fail(f"format {kind!r}; expected one of {', '.join(FORMATS)}")
+        from symgen.description import load_robot
+        from symgen.regroup.regrouping import regroup
+
+        regrouping = regroup(load_robot(robot))
+        if only is not None and only not in regrouping.names:
+            close = difflib.get_close_matches(only, regrouping.names, n=5, cutoff=0.4)
+            fail(
+                f"{only!r} is no base parameter of {regrouping.robot.name}; close: {', '.join(close) or 'none'} (all: symgen show {robot})"
+            )
+        if recursive and kind == "text":
+            typer.echo(recursive_text(regrouping))
+        else:
+            typer.echo({"text": flat_text, "latex": latex_text, "json": json_text}[kind](regrouping, only))
+
+
+def chosen(regrouping: Regrouping, only: str | None) -> list[BaseParameter]:
+    return [b for b in regrouping.base if only is None or b.name == only]
+
+
+def flat_text(regrouping: Regrouping, only: str | None) -> str:
+    """Aligned formulas as eq. (27); parameters that absorb nothing in one list; parameters without effect; counts and costs."""
+    from symgen.emit.header import wrapped
+
+    base = chosen(regrouping, only)
+    width = max(len(b.name) for b in base)
+    lines = []
+    for b in base:
+        if only or b.name != b.own:
+            lines += wrapped(f"{b.name:<{width}} = {b.formula}", "", " " * (width + 3))
+    if only:
+        return "\n".join(lines)
+    robot = regrouping.robot
+    head = f"{robot.title or robot.name}: {len(regrouping)} base parameters of {len(robot.parameters)}, {regrouping.method}"
+    alone = " ".join(b.name for b in base if b.name == b.own)
+    operations = [f"  {name:<26} {cost['mul']:>5} multiplications {cost['add']:>5} additions" for name, cost in costs(regrouping).items()]
+    return "\n".join(
+        [head, "", *lines, "", *wrapped("as they are: " + alone, ""), "", *wrapped("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""), "",
+         "operations per sample", *operations]
+    )  # fmt: skip
+
+
+def recursive_text(regrouping: Regrouping) -> str:
+    """One line per parameter that receives others, in terms of what those had already received: XXR_i = XX_i + YYR_j + ..."""
+    from symgen.description.expression import ONE
+    from symgen.regroup.regrouping import formula
+
+    received: dict[str, dict[str, Any]] = {}
+    for source, target, coefficient in regrouping.steps:
+        received.setdefault(target, {})[source] = coefficient
+
+    def name(p: str) -> str:
+        return p + "R" if p in received else p
+
+    lines = []
+    for p in reversed(regrouping.robot.parameters):
+        if p in received:
+            terms = {p: ONE} | {name(source): c for source, c in received[p].items() if c}
+            lines.append(f"{name(p)} = {formula(terms)}")
+    return "\n".join(lines)
+
+
+def latex_text(regrouping: Regrouping, only: str | None) -> str:
+    r"""The formulas in an `aligned` environment with subscripts, ZZ_{1R} &= ZZ_{1} + I_{a1} + ..."""
+    from symgen.cli.latex import latex_formula, latex_name
+
+    rows = [f"{latex_name(b.name)} &= {latex_formula(b.combination)} \\\\" for b in chosen(regrouping, only) if only or b.name != b.own]
+    return "\n".join(["\\begin{aligned}", *rows, "\\end{aligned}"])
+
+
+def costs(regrouping: Regrouping) -> dict[str, dict[str, int]]:
+    """Operations of the emitted text: all base columns, inertial (and Ia) ones alone."""
+    from symgen.emit.printers import Text
+    from symgen.emit.spec import inverse_dynamics, is_inertial, is_inertial_or_actuator, regressor_program
+
+    robot = regrouping.robot
+    inertial = tuple(own for own in regrouping.own if is_inertial_or_actuator(robot)(own))
+    result = {}
+    for name, own in (("regressor", regrouping.own), ("regressor_inertial", inertial)):
+        _, program = regressor_program(regrouping, own)
+        result[name] = dict(zip(("mul", "add"), Text(program.outputs, program.sections, ()).operations, strict=True))
+    for name, model in (
+        ("inverse_dynamics", inverse_dynamics(regrouping)),
+        ("inverse_dynamics_inertial", inverse_dynamics(regrouping, is_inertial(robot))),
+    ):
+        result[name] = {"mul": model.mul, "add": model.add}
+    return result
+
+
+def json_text(regrouping: Regrouping, only: str | None) -> str:
+    """The contract of `show --format json`."""
+    import json
+
+    from symgen.regroup.certificate import certify
+
+    document = {
+        "name": regrouping.robot.name,
+        "count": len(regrouping),
+        "standard_count": len(regrouping.robot.parameters),
+        "method": regrouping.method,
+        "base_parameters": [
+            {
+                "name": b.name,
+                "formula": b.formula,
+                "terms": [{"parameter": name, "coefficient": str(c)} for name, c in b.combination.items()],
+            }
+            for b in chosen(regrouping, only)
+        ],
+        "no_effect": list(regrouping.no_effect),
+        "operations": costs(regrouping),
+        "certificate": certify(regrouping).mapping(),
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False)
