@@ -60,6 +60,11 @@ class Identification:
         return ", ".join(record.name for record in self.records)
 
     @property
+    def source(self) -> str:
+        """Where the data come from: "measured", or "simulated" where the provenance says so."""
+        return "simulated" if self.every.provenance.get("simulated") else "measured"
+
+    @property
     def every(self) -> Estimate:
         """The fit of all parameters."""
         return self.found.all_parameters

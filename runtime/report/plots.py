@@ -45,11 +45,11 @@ def png(figure: Figure) -> bytes:
     return _rendered(figure, "png")
 
 
-def joint_overlay(joint: JointComparison, unit: str = "N m") -> Figure:
-    """Measured and predicted torque of one joint, and their difference (chapter, Fig. 4)."""
+def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "measured") -> Figure:
+    """Measured and predicted torque of one joint, and their difference (chapter, Fig. 4). source : "measured" or "simulated"."""
     with mpl.rc_context(STYLE):
         figure, (axes,) = _figure(1, 1, (5.4, 2.8))
-        _overlay(axes, joint, unit)
+        _overlay(axes, joint, unit, source)
         axes.set_title("")
         axes.set_title(_title(joint), fontsize=9, loc="right")
         axes.legend(
@@ -58,7 +58,7 @@ def joint_overlay(joint: JointComparison, unit: str = "N m") -> Figure:
     return figure
 
 
-def torque_overlay(comparison: Comparison, unit: str = "N m") -> Figure:
+def torque_overlay(comparison: Comparison, unit: str = "N m", source: str = "measured") -> Figure:
     """Fig. 4 of the chapter: every joint in a panel of its own."""
     joints = comparison.joints
     columns = 1 if len(joints) == 1 else 2
@@ -66,7 +66,7 @@ def torque_overlay(comparison: Comparison, unit: str = "N m") -> Figure:
     with mpl.rc_context(STYLE):
         figure, axes = _figure(rows, columns, (4.8 * columns, 2.3 * rows + 0.4))
         for ax, joint in zip(axes, joints, strict=False):
-            _overlay(ax, joint, unit)
+            _overlay(ax, joint, unit, source)
         for ax in axes[len(joints) :]:
             ax.set_visible(False)
         handles, labels = axes[0].get_legend_handles_labels()
@@ -137,10 +137,10 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = (), unit: st
     return figure
 
 
-def _overlay(ax: Axes, joint: JointComparison, unit: str) -> None:
+def _overlay(ax: Axes, joint: JointComparison, unit: str, source: str) -> None:
     """Lines break where rows were left out or another record starts."""
     t, measured, predicted, error = _broken(joint)
-    ax.plot(t, measured, color=BLACK, linewidth=1.5, label="measured")
+    ax.plot(t, measured, color=BLACK, linewidth=1.5, label=source)
     ax.plot(t, predicted, color=ORANGE, linewidth=1.0, linestyle=(0, (4, 1)), label="predicted")
     ax.plot(t, error, color=BLUE, linewidth=0.7, label="error")
     ax.set_title(_title(joint), fontsize=9)

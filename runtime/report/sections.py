@@ -43,13 +43,13 @@ def torque_section(found: Identification) -> Section:
     unit = torque_unit(found)
     images = [
         Image(
-            f"Joint {joint.joint}: measured, predicted by the essential parameters, and error; {joint.relative_error:.2f} % of the measured norm",
-            plots.svg(plots.joint_overlay(joint, unit)),
-            f"Torque of joint {joint.joint} against time: measured, predicted, error",
+            f"Joint {joint.joint}: {found.source}, predicted by the essential parameters, and error; {joint.relative_error:.2f} % of the {found.source} norm",
+            plots.svg(plots.joint_overlay(joint, unit, found.source)),
+            f"Torque of joint {joint.joint} against time: {found.source}, predicted, error",
         )
         for joint in found.comparison
     ]
-    return Section("Measured and predicted torques", images=images)
+    return Section(f"{found.source.capitalize()} and predicted torques", images=images)
 
 
 def joint_section(found: Identification) -> Section:

@@ -47,6 +47,7 @@ def test_offline_is_labelled_everywhere(offline):
     for name in ("estimate.json", "cestac.json"):
         provenance = json.loads((out / name).read_text())["provenance"]
         assert provenance["simulated"] is True and "SIMULATED" in provenance["note"]
+    assert "measured, predicted by" not in html
     study = (out / "study.yaml").read_text()
     assert "SIMULATED" in study and simulated.FILE in study and (out / simulated.FILE).is_file()
     assert "http://" not in html and "https://" not in html and "<script" not in html
@@ -81,7 +82,7 @@ def test_measured_record(tx40_data):
     with opened_model("tx40") as model:
         study = study_from_mapping(dataset_study("tx40"))
         record = read_records(study.record, model)[0]
-        shown = demonstrate(model, study, record, simulated=False, quick=False, step=lambda text: None)
+        shown = demonstrate(model, study, record, quick=False, step=lambda text: None)
     check_table_2(shown)
     check_table_3(shown)
     check_coupling(shown)

@@ -82,9 +82,20 @@ def test_generated_module_and_plain_record(tmp_path):
 def test_rank_deficient_record_names_the_parameters(tmp_path):
     q = np.zeros((4000, 2))
     q[:, 0] = np.sin(5 * np.arange(4000) / 1000)
-    result = run("planar_2r", plain_csv(tmp_path / "record.csv", q=q))
-    assert result.exit_code == 1
+    result = run("planar_2r", plain_csv(tmp_path / "record.csv", q=q), "-o", tmp_path / "out")
+    assert result.exit_code == 1, result.output
+    assert json.loads((tmp_path / "out" / "estimate.json").read_text())["status"] == "rank-deficient"
     assert "rank-deficient" in result.stdout and "cannot be told apart" in result.stdout and "FV2" in result.stdout
+
+
+def test_hostile_record_name_is_escaped(tmp_path):
+    plain_csv(tmp_path / "record.csv")
+    study = tmp_path / "study.yaml"
+    study.write_text("symgen: 1\nrecord: {files: [record.csv], name: '<script>alert(1)</script>'}\n")
+    result = run("planar_2r", study, "-o", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in html and "&lt;script&gt;alert(1)" in html
 
 
 def nan_record(folder):
