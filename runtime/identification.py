@@ -85,10 +85,11 @@ class Identification:
                 f"parameters, cannot be told apart: {names}."
             )
         worst = max(self.found.estimate.per_joint, key=lambda joint: joint.relative_error)
+        named = f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)" if self.observation.n > 1 else ""
         return (
             f"{len(self.found.names)} of {len(self.every.names)} parameters carry the model of {self.model.NAME}: they explain the record "
-            f"{self.name} to {self.found.estimate.relative_error:.1f} % (joint {worst.joint} worst, {worst.relative_error:.1f} %) and predict its "
-            f"unseen half to {self.predicted_error:.1f} %."
+            f"{self.name} to {self.found.estimate.relative_error:.1f} %{named} and predict an "
+            f"unseen part of it to {self.predicted_error:.1f} %."
         )
 
     def summary(self) -> dict[str, Any]:

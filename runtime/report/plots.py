@@ -80,7 +80,7 @@ def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
     columns = min(3, len(joints))
     rows = -(-len(joints) // columns)
     with mpl.rc_context(STYLE):
-        figure, axes = _figure(rows, columns, (3.2 * columns, 2.1 * rows + 0.4))
+        figure, axes = _figure(rows, columns, (max(5.4, 3.2 * columns), 2.1 * rows + 0.4))
         for ax, joint in zip(axes, joints, strict=False):
             deviation = float(np.std(joint.error)) or 1.0
             x = np.linspace(-4, 4, 161)

@@ -84,7 +84,7 @@ def verdict(shown: Demonstration) -> str:
     label = "SIMULATED record: " if shown.simulated else ""
     return (
         f"{label}{len(found.found.names)} of {len(found.every.names)} parameters explain the torques of {found.model.NAME} to "
-        f"{found.found.estimate.relative_error:.1f} % and predict an unseen half to {found.predicted_error:.1f} %; by the residual of least squares, "
+        f"{found.found.estimate.relative_error:.1f} % and predict an unseen half of the record to {found.predicted_error:.1f} %; by the residual of least squares, "
         f"{steps}."
     )
 
