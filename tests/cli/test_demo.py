@@ -1,4 +1,4 @@
-"""The demo: labelled as simulated without data; beside the chapter's tables with it (issue of the first milestone, points 9 and 10)."""
+"""The demo: labelled as simulated without data; with it, within the stated tolerances of the chapter's Tables 2 and 3."""
 
 import json
 
@@ -78,7 +78,7 @@ def test_simulated_trajectory_keeps_the_limits():
 
 
 def test_measured_record(tx40_data):
-    """Points 9 and 10 of the first milestone, and every table of the report; one test, since the demo runs once."""
+    """Tables 2 and 3 within their tolerances, and every table of the report; one test, since the demo runs once."""
     with opened_model("tx40") as model:
         study = study_from_mapping(dataset_study("tx40"))
         record = read_records(study.record, model)[0]
