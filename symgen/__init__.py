@@ -12,7 +12,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from symgen.errors import SymgenError
-from symgen.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from symgen.description import Robot, load_robot, packaged_robots, parse_robot
@@ -49,4 +48,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*__all__, "__version__"])
+    return sorted(__all__)
