@@ -1,0 +1,1 @@
+"""Mechanics, written once over scalars: geometry, recursions, loops; Lagrange by CasADi as an independent check."""

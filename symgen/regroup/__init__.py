@@ -1,0 +1,1 @@
+"""Base parameters with exact formulas, and their certificate."""
