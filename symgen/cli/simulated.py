@@ -72,23 +72,31 @@ def point_to_point(model: GeneratedModel, duration: float, seed: int, rate: floa
 
 def motor_record(model: GeneratedModel, duration: float, seed: int) -> tuple[bytes, RecordSettings]:
     """A .csv.gz file t,q1..qn,tau1..taun of the motor side, and the settings that read it."""
+    return recorded(model, point_to_point(model, duration, seed), seed)
+
+
+def recorded(
+    model: GeneratedModel, path: Trajectory, seed: int, *, rate: float = RATE, encoder: float = ENCODER, noise: float = NOISE
+) -> tuple[bytes, RecordSettings]:
+    """The file, and the settings that read it, of a motion: motor positions in steps of `encoder`, torques with white noise.
+
+    rate : Hz.   encoder : rad on the motor.   noise : standard deviation, of the largest torque of each motor.
+    """
     require(model, "base_parameters", "inverse_dynamics")
     drives = Drives.from_mapping(model.DRIVES or {"ratio": np.eye(len(model.JOINTS))})
-    path = point_to_point(model, duration, seed)
     X = model.base_parameters(model.VALUES)  # type: ignore[attr-defined]
     tau = model.inverse_dynamics(path.q, path.qd, path.qdd, X)  # type: ignore[attr-defined]
     command = drives.motor_command(tau)
     rng = np.random.default_rng([seed, 1])
-    command += NOISE * np.abs(command).max(axis=0) * rng.standard_normal(command.shape)
-    qm = ENCODER * np.round(drives.motor_position(path.q) / ENCODER)
+    command += noise * np.abs(command).max(axis=0) * rng.standard_normal(command.shape)
+    qm = encoder * np.round(drives.motor_position(path.q) / encoder)
     n = len(model.JOINTS)
     q_names, tau_names = (tuple(f"{letter}{j}" for j in range(1, n + 1)) for letter in ("q", "tau"))
     stream = BytesIO()
     np.savetxt(stream, np.column_stack([qm, command]), fmt="%.7g", delimiter=",", header=",".join((*q_names, *tau_names)), comments="")
     side: Literal["motor", "joint"] = "motor" if model.DRIVES is not None else "joint"
-    settings = RecordSettings(
-        files=(FILE,), columns=Columns(None, q_names, tau_names), side=side, rate=RATE, name=f"{SIMULATED} {model.NAME}"
-    )
+    name = f"{SIMULATED} {model.NAME}"
+    settings = RecordSettings(files=(FILE,), columns=Columns(None, q_names, tau_names), side=side, rate=rate, name=name)
     return gzip.compress(stream.getvalue(), compresslevel=1, mtime=0), settings
 
 
