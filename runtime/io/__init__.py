@@ -1,0 +1,1 @@
+"""Reading records and data sets: one format per file."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from symgen.description.expression import ONE, Call, Expression
+from symgen.regroup.regrouping import shared
 
 FAMILIES = {"Ia": ("I", "a"), "FV": ("F", "v"), "FS": ("F", "s"), "FVM": ("F", "vm"), "FSM": ("F", "sm")}
 GREEK = re.compile(r"(alpha|beta|gamma|delta|theta|phi|psi)")
@@ -20,8 +21,6 @@ def latex_name(name: str) -> str:
     stem, index, regrouped = match.groups()
     letter, prefix = FAMILIES.get(stem, (stem, ""))
     text = GREEK.sub(r"\\\1 ", letter).replace("_", r"\_").strip()
-    if len(letter) > 1 and text == letter:
-        text = rf"\mathit{{{text}}}"
     subscript = prefix + index + regrouped
     return f"{text}_{{{subscript}}}" if subscript else text
 
@@ -62,17 +61,20 @@ def _power(a: str | Call, n: int) -> str:
 
 
 def latex_formula(combination: Mapping[str, Expression]) -> str:
-    """sum_k c_k chi_k; parameters with one coefficient share it."""
-    groups: dict[Expression, list[str]] = {}
-    for name, c in combination.items():
-        groups.setdefault(c, []).append(latex_name(name))
+    """The terms of the text formula, in its order."""
     text = ""
-    for c, names in groups.items():
-        inner = " + ".join(names)
+    for c, names in shared(combination).items():
+        inner = _signed_sum([("-", latex_name(n[1:])) if n.startswith("-") else ("+", latex_name(n)) for n in names])
+        several = rf"\left({inner}\right)" if len(names) > 1 else inner
         if c in (ONE, -ONE):
-            term = inner if c == ONE else ("-" + (rf"\left({inner}\right)" if len(names) > 1 else inner))
+            term = inner if c == ONE else "-" + several
         else:
             factor = latex_expression(c) if len(c.terms) == 1 else rf"\left({latex_expression(c)}\right)"
-            term = factor + r"\," + (rf"\left({inner}\right)" if len(names) > 1 else inner)
+            term = rf"{factor}\,{several}"
         text = term if not text else text + (f" - {term[1:]}" if term.startswith("-") else f" + {term}")
     return text
+
+
+def _signed_sum(terms: list[tuple[str, str]]) -> str:
+    first, *rest = terms
+    return ("-" if first[0] == "-" else "") + first[1] + "".join(f" {sign} {name}" for sign, name in rest)

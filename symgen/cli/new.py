@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from symgen.cli.session import fail, reported_errors
+from symgen.cli.writing import write_all
 
 
 def new(file: Annotated[Path, typer.Argument(help="Robot file to create, e.g. my_arm.yaml.")]) -> None:
@@ -18,9 +19,7 @@ def new(file: Annotated[Path, typer.Argument(help="Robot file to create, e.g. my
         if file.suffix not in (".yaml", ".yml"):
             fail(f"{file}: a robot file ends in .yaml")
         text = skeleton(file.stem)
-        try:
-            with file.open("x", encoding="utf-8") as stream:
-                stream.write(text)
-        except FileExistsError:
+        if file.exists():
             fail(f"{file} exists already; choose another name or edit it")
+        write_all(file.parent, {file.name: text})
         typer.echo(f"{file}: edit it, then\n  symgen show {file}\n  symgen generate {file} -o generated")

@@ -27,6 +27,8 @@ def show(
         kind = "json" if json else format
         if kind not in FORMATS:
             fail(f"format {kind!r}; expected one of {', '.join(FORMATS)}")
+        if recursive and (kind != "text" or only):
+            fail("--recursive prints every step as text; leave out --format and --only")
         from symgen.description import load_robot
         from symgen.regroup.regrouping import regroup
 
@@ -36,7 +38,7 @@ def show(
             fail(
                 f"{only!r} is no base parameter of {regrouping.robot.name}; close: {', '.join(close) or 'none'} (all: symgen show {robot})"
             )
-        if recursive and kind == "text":
+        if recursive:
             typer.echo(recursive_text(regrouping))
         else:
             typer.echo({"text": flat_text, "latex": latex_text, "json": json_text}[kind](regrouping, only))
@@ -75,6 +77,8 @@ def recursive_text(regrouping: Regrouping) -> str:
 
     received: dict[str, dict[str, Any]] = {}
     for source, target, coefficient in regrouping.steps:
+        if target in regrouping.no_effect:
+            continue
         received.setdefault(target, {})[source] = coefficient
 
     def name(p: str) -> str:

@@ -151,14 +151,19 @@ def simplified(e: Expression) -> Expression:
     return e
 
 
-def formula(combination: Mapping[str, Expression]) -> str:
-    """Text of sum_k c_k chi_k in the grammar of robot files; parameters with one coefficient share it, as in eq. (27)."""
+def shared(combination: Mapping[str, Expression]) -> dict[Expression, list[str]]:
+    """{coefficient: parameters that share it}, those with the opposite one as "-name"; the order is that of the formula."""
     groups: dict[Expression, list[str]] = {}
     for name, c in combination.items():
         key = c if not (-c in groups and c not in groups) else -c
         groups.setdefault(key, []).append(name if key == c else "-" + name)
+    return groups
+
+
+def formula(combination: Mapping[str, Expression]) -> str:
+    """Text of sum_k c_k chi_k in the grammar of robot files; parameters with one coefficient share it, as in eq. (27)."""
     text = ""
-    for c, names in groups.items():
+    for c, names in shared(combination).items():
         inner = names[0] + "".join(f" - {n[1:]}" if n.startswith("-") else f" + {n}" for n in names[1:])
         term = _term(c, inner, len(names) > 1)
         text = term if not text else text + (f" - {term[1:]}" if term.startswith("-") else f" + {term}")
