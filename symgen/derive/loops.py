@@ -27,7 +27,7 @@ from symgen.errors import DescriptionError
 
 Array = np.ndarray
 STARTS, STEPS, TOLERANCE = 60, 60, 1e-11
-INDEPENDENT_MOTIONS = 1e-7  # singular values below, relative to the largest, are no constraint
+INDEPENDENT_MOTIONS = 1e-7  # singular values below, relative to the largest and to 1, are no constraint (differences are good to 1e-9)
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def _rank(J: Array) -> int:
     if J.size == 0:
         return 0
     s = np.linalg.svd(J, compute_uv=False)
-    return int(np.sum(s > INDEPENDENT_MOTIONS * max(float(s[0]), 1e-6)))
+    return int(np.sum(s > INDEPENDENT_MOTIONS * max(float(s[0]), 1.0)))
 
 
 def find_relations(robot: Robot) -> Found:
