@@ -1,6 +1,6 @@
 """Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from haptic.yaml, sha256 421a2d5c3fb8, by symgen 0.1.0. Do not edit; symgen generate haptic
+GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.1.0. Do not edit; symgen generate haptic
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  mu  sigma  alpha    d  theta  r
@@ -65,7 +65,7 @@ import numpy as np
 
 SCHEMA = 1
 NAME = 'haptic'
-SOURCE_SHA256 = '421a2d5c3fb81a818cb29eadeef4f409b7312652bee6bfc113c405f22e7ceb67'
+SOURCE_SHA256 = '905194db7b3b75bf540a196cd93f3044c531cdf74245c6c84322acf1f75f4827'
 JOINTS = (1, 2, 5)
 PASSIVE = (3, 4, 6, 7)
 CONSTANTS = {'D3': 0.2, 'D4': 0.22, 'D6': 0.1, 'c': 0.0, 'gx': -9.81, 'gy': 0.0}

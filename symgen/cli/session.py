@@ -35,15 +35,20 @@ def single_thread() -> None:
 @contextmanager
 def reported_errors() -> Iterator[None]:
     """Bad input as one message on the error stream and exit code 2, never a traceback."""
-    from runtime.errors import InputError
     from symgen.errors import SymgenError
 
     try:
         yield
-    except (InputError, SymgenError) as e:
-        fail(str(e))
-    except OSError as e:
-        fail(f"{e.filename or 'file'}: {e.strerror or e}")
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as e:
+        from runtime.errors import InputError  # not before it is needed: runtime takes most of a second to load
+
+        if isinstance(e, InputError | SymgenError):
+            fail(str(e))
+        if isinstance(e, OSError):
+            fail(f"{e.filename or 'file'}: {e.strerror or e}")
+        raise
 
 
 def fail(message: str) -> NoReturn:

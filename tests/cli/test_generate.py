@@ -1,0 +1,136 @@
+"""`symgen generate`: modules are current, deterministic, and written whole or not at all."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from symgen.cli.generate import emitted
+from symgen.cli.main import app
+from symgen.cli.writing import write_all
+from symgen.description import packaged_robots, skeleton
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["generate", *map(str, arguments)])
+
+
+@pytest.mark.parametrize("name", packaged_robots())
+def test_checked_in_modules_are_current(name):
+    """Golden text: the bytes of generated/."""
+    result = run(name, "--check", "-o", GENERATED)
+    assert result.exit_code == 0, result.output
+
+
+def test_nothing_else_is_checked_in():
+    assert {p.stem for p in GENERATED.glob("*.py")} == set(packaged_robots())
+
+
+def test_same_bytes_whatever_the_hash_seed():
+    code = "import hashlib, sys\nfrom symgen.cli.generate import emitted\n"
+    code += "for name, text in emitted(['tx40', 'two_branch']).items(): print(name, hashlib.sha256(text.encode()).hexdigest())"
+    seen = {
+        subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env={**os.environ, "PYTHONHASHSEED": seed}).stdout
+        for seed in ("1", "77")
+    }
+    assert len(seen) == 1
+
+
+def test_own_robot_from_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.yaml").write_text(skeleton("arm"))
+    result = run("arm.yaml", "-o", "deep/models")
+    assert result.exit_code == 0 and result.stdout.strip() == str(Path("deep/models/arm.py"))
+    code = (
+        "import sys, numpy as np\nsys.path.insert(0, 'deep/models')\nimport arm\nx = np.zeros((5, 2))\nprint(arm.regressor(x, x, x).shape)"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "(5, 2, 13)"
+    assert [p.name for p in (tmp_path / "deep" / "models").iterdir() if p.suffix == ".py"] == ["arm.py"]
+    assert str(tmp_path) not in (tmp_path / "deep" / "models" / "arm.py").read_text()
+
+
+def test_default_folder_is_generated(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run("emps").exit_code == 0
+    assert (tmp_path / "generated" / "emps.py").read_bytes() == (GENERATED / "emps.py").read_bytes()
+
+
+def test_check_shows_what_changed_and_writes_nothing(tmp_path):
+    (tmp_path / "emps.py").write_text((GENERATED / "emps.py").read_text().replace("NAME = 'emps'", "NAME = 'old'"))
+    before = (tmp_path / "emps.py").read_bytes()
+    result = run("emps", "planar_2r", "--check", "-o", tmp_path)
+    assert result.exit_code == 1
+    assert "-NAME = 'old'" in result.stdout and "+NAME = 'emps'" in result.stdout
+    assert "not current" in result.stderr and "planar_2r.py" in result.stderr
+    assert (tmp_path / "emps.py").read_bytes() == before and len(list(tmp_path.iterdir())) == 1
+
+
+def test_one_bad_robot_and_nothing_is_written(tmp_path):
+    bad = tmp_path / "bad.yaml"
+    bad.write_text(skeleton("bad").replace("sigma: 0, alpha: 0, d: D2", "sigma: 3, alpha: 0, d: D2"))
+    out = tmp_path / "out"
+    result = run("emps", bad, "-o", out)
+    assert result.exit_code == 2 and not out.exists()
+    assert "sigma = 3" in result.stderr and "line" in result.stderr and "Traceback" not in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["no_such_robot"], "no_such_robot"),
+        (["missing.yaml"], "missing.yaml"),
+        (["emps", "--target", "fortran"], "fortran"),
+        (["emps", "emps"], "two robots are called emps"),
+        ([], "ROBOT"),
+    ],
+)
+def test_bad_input_is_exit_2(arguments, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run(*arguments)
+    assert result.exit_code == 2 and words in result.output and "Traceback" not in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_output_that_is_a_file(tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    result = run("emps", "-o", tmp_path / "taken")
+    assert result.exit_code == 2 and "taken" in result.stderr and (tmp_path / "taken").read_text() == "mine"
+
+
+@pytest.mark.parametrize("failure", [OSError(28, "No space left on device", "emps.py"), KeyboardInterrupt()])
+def test_interrupted_writing_leaves_the_folder_as_it_was(failure, tmp_path, monkeypatch):
+    (tmp_path / "emps.py").write_text("old")
+    written = []
+
+    def full(path, data):
+        written.append(path.name)
+        if len(written) == 2:
+            raise failure
+        with path.open("wb") as stream:
+            return stream.write(data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    result = run("emps", "planar_2r", "-o", tmp_path)
+    assert result.exit_code in (1, 2, 130) and "Traceback" not in result.output
+    if isinstance(failure, OSError):
+        assert result.exit_code == 2 and "No space left on device" in result.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["emps.py"] and (tmp_path / "emps.py").read_text() == "old"
+
+
+def test_write_all_replaces_whole_files(tmp_path):
+    write_all(tmp_path, {"a.txt": "old", "b.txt": b"old"})
+    assert write_all(tmp_path, {"a.txt": "new"}) == [tmp_path / "a.txt"]
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a.txt": "new", "b.txt": "old"}
+
+
+def test_command_in_the_header_names_no_folder(tmp_path):
+    path = tmp_path / "arm.yaml"
+    path.write_text(skeleton("arm"))
+    text = emitted([str(path)])["arm.py"]
+    assert "symgen generate arm.yaml" in text and str(tmp_path) not in text

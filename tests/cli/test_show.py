@@ -1,0 +1,132 @@
+"""`symgen show`: text, LaTeX and JSON say the same formulas; operation counts are those of a text."""
+
+import ast
+import json
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from symgen.cli.main import app
+from symgen.description import load_robot, packaged_robots, parse
+from symgen.emit.printers import Text
+from symgen.emit.spec import inverse_dynamics, is_inertial, is_inertial_or_actuator, regressor_program
+from symgen.regroup.regrouping import regroup
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+CLOSED = {"haptic", "five_bar", "four_bar"}  # general loops take longer; tests/regroup covers them
+
+
+def counted(source):
+    """(multiplications, additions) by syntax tree; a square is one multiplication, a sign is free."""
+    operators = [node.op for node in ast.walk(ast.parse(source)) if isinstance(node, ast.BinOp)]
+    return sum(isinstance(op, ast.Mult | ast.Pow) for op in operators), sum(isinstance(op, ast.Add | ast.Sub) for op in operators)
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["show", *map(str, arguments)])
+
+
+def constant(name, module):
+    tree = ast.parse((GENERATED / f"{module}.py").read_text())
+    return next(ast.literal_eval(n.value) for n in tree.body if isinstance(n, ast.Assign) and n.targets[0].id == name)
+
+
+def test_text_is_equation_27():
+    """Chapter, eq. (27), with Ia written Ia."""
+    out = run("tx40").stdout
+    assert "60 base parameters of 86" in out
+    for line in (
+        "ZZ1R    = ZZ1 + Ia1 + YY2 + YY3 + D3**2*(M3 + M4 + M5 + M6)",
+        "XX2R    = XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)",
+        "MY3R    = MY3 - MZ4 - RL4*(M4 + M5 + M6)",
+        "XX6R    = XX6 - YY6",
+        "no effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2",
+    ):
+        assert line in out.splitlines()
+
+
+@pytest.mark.parametrize("name", [n for n in packaged_robots() if n not in CLOSED])
+def test_formulas_are_those_of_the_module(name):
+    document = json.loads(run(name, "--json").stdout)
+    assert {b["name"]: b["formula"] for b in document["base_parameters"]} == constant("FORMULAS", name)
+    assert document["no_effect"] == list(constant("NO_EFFECT", name))
+    text = re.sub(r"\n {4,}", " ", run(name).stdout)
+    for b in document["base_parameters"]:
+        if b["name"] != b["formula"]:
+            assert re.search(rf"^{b['name']} += {re.escape(b['formula'])}$", text, re.MULTILINE), b["name"]
+
+
+def test_json_contract():
+    document = json.loads(run("tx40", "--format", "json").stdout)
+    assert {"name", "count", "standard_count", "base_parameters", "no_effect", "operations", "certificate"} <= set(document)
+    assert (document["name"], document["count"], document["standard_count"]) == ("tx40", 60, 86)
+    assert document["certificate"]["valid"] is True
+    assert set(document["operations"]) == {"regressor", "regressor_inertial", "inverse_dynamics", "inverse_dynamics_inertial"}
+    for b in document["base_parameters"]:  # a formula is the sum of its terms, in the grammar of robot files
+        names = {t["parameter"] for t in b["terms"]} | {"D3", "RL4", "g"}
+        total = " + ".join(f"({t['coefficient']})*{t['parameter']}" for t in b["terms"])
+        assert parse(b["formula"], names) == parse(total, names)
+
+
+def test_operations_are_those_of_the_text():
+    regrouping = regroup(load_robot("tx40"))
+    robot = regrouping.robot
+    operations = json.loads(run("tx40", "--json").stdout)["operations"]
+    inertial = [own for own in regrouping.own if is_inertial_or_actuator(robot)(own)]
+    texts = {}
+    for name, own in (("regressor", regrouping.own), ("regressor_inertial", inertial)):
+        _, program = regressor_program(regrouping, own)
+        text = Text(program.outputs, program.sections, ())
+        texts[name] = [line for s in text.sections for line in s.lines] + [text.expression(o) for o in program.outputs]
+    for name, model in (("inverse_dynamics", inverse_dynamics(regrouping)),
+                        ("inverse_dynamics_inertial", inverse_dynamics(regrouping, is_inertial(robot)))):  # fmt: skip
+        texts[name] = [line for s in model.sections for line in s.lines]
+    for name, lines in texts.items():
+        assert counted("\n".join(lines)) == (operations[name]["mul"], operations[name]["add"]), name
+    header = (GENERATED / "tx40.py").read_text()
+    for name in ("regressor", "inverse_dynamics"):
+        assert re.search(rf"{name} +{operations[name]['mul']} multiplications, {operations[name]['add']} additions", header)
+
+
+def test_only_one():
+    assert run("tx40", "--only", "XX2R").stdout == "XX2R = XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)\n"
+    assert [b["name"] for b in json.loads(run("emps", "--only", "M1R", "--json").stdout)["base_parameters"]] == ["M1R"]
+    result = run("tx40", "--only", "XX2")
+    assert result.exit_code == 2 and "XX2R" in result.stderr and result.stdout == ""
+
+
+def test_latex():
+    out = run("tx40", "--format", "latex").stdout
+    assert r"ZZ_{1R} &= ZZ_{1} + I_{a1} + YY_{2} + YY_{3} + D_{3}^{2}\,\left(M_{3} + M_{4} + M_{5} + M_{6}\right) \\" in out
+    assert r"XX_{6R} &= XX_{6} - YY_{6} \\" in out
+    assert out.startswith("\\begin{aligned}") and out.count("{") == out.count("}")
+
+
+def test_recursive_form_expands_to_the_flat_one():
+    """Substituting YYR_j, MZR_j, MR_j link by link gives the formulas of eq. (27)."""
+    lines = dict(line.split(" = ") for line in run("tx40", "--recursive").stdout.splitlines())
+    assert lines["YY2R"] == "YY2 + YY3 + D3**2*M3R" and lines["M5R"] == "M5 + M6"
+    regrouping = regroup(load_robot("tx40"))
+    names = {*regrouping.robot.parameters, *lines, "D3", "RL4", "g"}
+
+    def expanded(text):
+        while found := [n for n in re.findall(r"\w+R\b", text) if n in lines]:
+            text = re.sub(rf"\b{found[0]}\b", f"({lines[found[0]]})", text)
+        return parse(text, names)
+
+    for b in regrouping.base:
+        if b.name != b.own:
+            assert expanded(b.name) == parse(b.formula, names), b.name
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["tx41"], "tx40"),
+    (["tx40", "--format", "html"], "html"),
+    (["tx40", "--recursive", "--json"], "--recursive"),
+    (["nowhere/arm.yaml"], "arm.yaml"),
+])  # fmt: skip
+def test_bad_input_is_exit_2(arguments, words):
+    result = run(*arguments)
+    assert result.exit_code == 2 and words in result.stderr and "Traceback" not in result.output and result.stdout == ""
