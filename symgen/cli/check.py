@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -9,6 +10,7 @@ import typer
 from symgen.cli.session import NEGATIVE, reported_errors, single_thread
 
 if TYPE_CHECKING:
+    from symgen.description import Robot
     from symgen.regroup.regrouping import Regrouping
 
 TOLERANCE = 1e-9  # relative to the largest entry: rounding of some thousand operations and of the closed loops
@@ -41,7 +43,7 @@ def numeric(regrouping: Regrouping) -> dict[str, Any]:
     from symgen.regroup.certificate import numeric_rank
 
     robot = regrouping.robot
-    W, names = numeric_regressor(robot, 3 * len(robot.parameters) // len(robot.joints) + 10, seed=5)
+    W, names = numeric_regressor(in_one_mode(robot), 3 * len(robot.parameters) // len(robot.joints) + 10, seed=5)
     rank, gap = numeric_rank(W)
     chi = np.random.default_rng(6).standard_normal(len(names))
     value = dict(zip(names, chi, strict=True))
@@ -54,6 +56,21 @@ def numeric(regrouping: Regrouping) -> dict[str, Any]:
         "torque_error": error,
         "numeric_valid": rank == len(regrouping) and error < TOLERANCE,
     }
+
+
+def in_one_mode(robot: Robot) -> Robot:
+    """`robot` with its passive joints declared where they are linear in the actuated ones, so that no state lands in an anti-parallelogram.
+
+    The independent dynamics still closes every loop itself and refuses states in which the declared joints do not.
+    """
+    from symgen.derive.loops import close
+    from symgen.description.expression import Expression
+
+    closure = close(robot)
+    if closure.tied:
+        return robot
+    declared = {j: sum((g * Expression.symbol(f"q{i}") for i, g in closure.row[j].items()), closure.offset[j]) for j in robot.passive}
+    return replace(robot, constraints=declared)
 
 
 def as_json(document: dict[str, Any]) -> str:
