@@ -48,7 +48,7 @@ def png(figure: Figure) -> bytes:
 def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "measured") -> Figure:
     """Measured and predicted torque of one joint, and their difference (chapter, Fig. 4). source : "measured" or "simulated"."""
     with mpl.rc_context(STYLE):
-        figure, (axes,) = _figure(1, 1, (5.4, 2.8))
+        figure, (axes,) = panels_figure(1, 1, (5.4, 2.8))
         _overlay(axes, joint, unit, source)
         axes.set_title("")
         axes.set_title(_title(joint), fontsize=9, loc="right")
@@ -64,7 +64,7 @@ def torque_overlay(comparison: Comparison, unit: str = "N m", source: str = "mea
     columns = 1 if len(joints) == 1 else 2
     rows = -(-len(joints) // columns)
     with mpl.rc_context(STYLE):
-        figure, axes = _figure(rows, columns, (4.8 * columns, 2.3 * rows + 0.4))
+        figure, axes = panels_figure(rows, columns, (4.8 * columns, 2.3 * rows + 0.4))
         for ax, joint in zip(axes, joints, strict=False):
             _overlay(ax, joint, unit, source)
         for ax in axes[len(joints) :]:
@@ -80,7 +80,7 @@ def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
     columns = min(3, len(joints))
     rows = -(-len(joints) // columns)
     with mpl.rc_context(STYLE):
-        figure, axes = _figure(rows, columns, (max(5.4, 3.2 * columns), 2.1 * rows + 0.4))
+        figure, axes = panels_figure(rows, columns, (max(5.4, 3.2 * columns), 2.1 * rows + 0.4))
         for ax, joint in zip(axes, joints, strict=False):
             deviation = float(np.std(joint.error)) or 1.0
             x = np.linspace(-4, 4, 161)
@@ -107,7 +107,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = (), unit: st
     e = np.array([level.e for level in levels]).reshape(len(levels), -1)
     chosen = [name for name in names if name in result.names] or _sharpest(result)
     with mpl.rc_context(STYLE):
-        figure, (ax,) = _figure(1, 1, (6.4, 4.4))
+        figure, (ax,) = panels_figure(1, 1, (6.4, 4.4))
         for name in result.deciding:
             if name not in chosen:
                 ax.plot(delta, _drawn(e[:, result.names.index(name)]), color="#C8C8C8", linewidth=0.8, zorder=1)
@@ -169,7 +169,7 @@ def _drawn(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values) & (values > 0), values, np.nan)
 
 
-def _figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+def panels_figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     return figure, list(np.ravel(figure.subplots(rows, columns, squeeze=False)))

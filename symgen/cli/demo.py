@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,13 +22,32 @@ SEED = 1
 DURATION, SHORT = 9.0, 4.0  # s of the simulated record, and of that of the quick form
 
 
+class Demo(StrEnum):
+    """Robots of the chapter."""
+
+    tx40 = "tx40"
+    haptic = "haptic"
+
+
 def demo(
+    robot: Annotated[Demo, typer.Argument(help="The robot of the chapter that is shown.")] = Demo.tx40,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")] = Path("symgen-demo"),
     quick: Annotated[bool, typer.Option("--quick", help="Two runs per step and no further studies.")] = False,
 ) -> None:
-    """Identify the Stäubli TX40 and judge its encoder resolution, beside the published tables."""
+    """Identify the Stäubli TX40 (or the haptic interface, simulated) and judge its encoder resolution, beside the published tables."""
     single_thread()
-    with reported_errors(), opened_model(ROBOT) as model:
+    with reported_errors():
+        if robot is Demo.haptic:
+            from symgen.cli.demo_haptic import demo_haptic
+
+            demo_haptic(output, quick)
+        else:
+            demo_tx40(output, quick)
+
+
+def demo_tx40(output: Path, quick: bool) -> None:
+    """The demo of the TX40."""
+    with opened_model(ROBOT) as model:
         from symgen.cli.demonstration import demonstrate
 
         study, record, extra, missing = measured_or_simulated(model, output, quick)

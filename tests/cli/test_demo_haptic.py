@@ -1,0 +1,102 @@
+"""The demo of the haptic interface: motion, record and report labelled as simulated, figures of the order of Tables 6 and 7."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from symgen.cli import demo as module
+from symgen.cli import haptic_record, haptic_tables, simulated
+from symgen.description import load_robot
+
+# chapter, Tables 6 and 7: the fourteen parameters in the order printed, fC as FS
+FOURTEEN = ["ZZ1R", "MY1R", "FS1", "XX2R", "ZZ2R", "MX2R", "FS2R", "OFFSET2", "XX3R", "ZZ3R", "MX3R", "MX5R", "FS5R", "OFFSET5"]
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """The quick demo: a quarter of the record, two runs."""
+    out = tmp_path_factory.mktemp("haptic") / "out"
+    app = typer.Typer()
+    app.command()(module.demo)
+    return CliRunner().invoke(app, ["haptic", "-o", str(out), "--quick"]), out
+
+
+def test_labelled_as_simulated_everywhere(quick):
+    result, out = quick
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("SIMULATED record") and "nothing below was measured" in result.stderr
+    html = (out / "report.html").read_text(encoding="utf-8")
+    assert "SIMULATED" in html[html.index("<h1>") : html.index("</h1>")] and 'class="warning"' in html
+    for name in ("estimate.json", "cestac.json"):
+        provenance = json.loads((out / name).read_text())["provenance"]
+        assert provenance["simulated"] is True and "SIMULATED" in provenance["note"]
+    assert "SIMULATED" in (out / "study.yaml").read_text() and (out / simulated.FILE).is_file()
+    assert "http://" not in html and "https://" not in html and "<script" not in html
+
+
+def test_report_has_its_tables_and_figures(quick):
+    _, out = quick
+    html = (out / "report.html").read_text(encoding="utf-8")
+    for words in (
+        "What is given and what is assumed",
+        "Table 6, LS",
+        "Table 7, 2*pi/80",
+        "configurations are singular",
+        "largest apparent mass",
+    ):
+        assert words in html
+    assert html.count("data:image/svg+xml") >= 6
+    assert (out / "handle.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_table_6_comes_back(quick):
+    """All fourteen, no other, within 3.5 standard deviations (10) of what was put in: fourteen draws, sigma of equal noise on all joints."""
+    _, out = quick
+    essential = json.loads((out / "estimate.json").read_text())["essential"]
+    assert essential["names"] == FOURTEEN
+    for name, x, sigma in zip(FOURTEEN, essential["X"], essential["sigma"], strict=True):
+        assert abs(x - float(haptic_tables.TABLE_6[name])) < 3.5 * sigma, name
+
+
+def test_table_7_has_the_order_of_the_chapter(quick):
+    """%e below 1 % at the real step; small variations, then biased, among main inertia and gravity parameters; dry friction stays."""
+    result, out = quick
+    levels = {round(2 * np.pi / level["level"]["delta"]): level["e"] for level in json.loads((out / "cestac.json").read_text())["levels"]}
+    assert set(levels) == {4000, 200, 100, 80}
+    names = FOURTEEN
+    main = [i for i, name in enumerate(names) if name[:2] in ("ZZ", "XX", "MX", "MY")]
+    friction = [i for i, name in enumerate(names) if name.startswith("FS")]
+    assert max(levels[4000]) < 1
+    assert 1 < max(levels[100][i] for i in main) < 5 < max(levels[80][i] for i in main) < 10
+    assert max(levels[80][i] for i in friction) < 1.5
+    growth = [levels[80][i] / levels[100][i] for i in main if levels[100][i] > 1]
+    assert 1.2 < np.median(growth) < 2  # Delta**2 gives 1.56
+    assert re.search(r"practically unbiased at 2\*pi/4000 .*small variations at 2\*pi/100 .*biased at 2\*pi/80", result.stdout)
+
+
+def test_motion():
+    """Derivatives by central differences at 1 kHz; constant speed on the triangles; inside the limits of the robot file."""
+    path = haptic_record.motion()
+    for x, dx in ((path.q, path.qd), (path.qd, path.qdd)):
+        assert np.abs(np.gradient(x, path.t, axis=0) - dx)[1:-1].max() < 1e-4 * np.abs(dx).max()
+    slow = path.t < haptic_record.LOW - haptic_record.CHANGE
+    assert ((np.abs(path.qdd[slow]) == 0).mean(axis=0) > 0.85).all()
+    for (_, periods, _), speed in zip(haptic_record.TRIANGLES, np.abs(path.qd[slow]).max(axis=0), strict=True):
+        assert speed < 0.3 and periods >= 5
+    limits = load_robot("haptic").limits
+    low, high = np.array(limits["q"]).T
+    assert (path.q >= low).all() and (path.q <= high).all()
+    assert (np.abs(path.qd) <= limits["qd"]).all() and (np.abs(path.qdd) <= limits["qdd"]).all()
+    elbow = path.q[:, 2] - path.q[:, 1] + np.pi  # the parallelogram is singular at 0 and pi
+    assert elbow.min() > 0.3 and elbow.max() < np.pi - 0.3
+
+
+def test_unknown_robot_is_bad_input():
+    app = typer.Typer()
+    app.command()(module.demo)
+    result = CliRunner().invoke(app, ["stanford"])
+    assert result.exit_code == 2 and "tx40" in result.output and "haptic" in result.output
