@@ -31,7 +31,8 @@ def offline(tmp_path_factory):
         patch.delenv("SYMGEN_DATA", raising=False)
         patch.setattr("runtime.io.datasets.pooch.os_cache", lambda name: folder / "cache")
         patch.setattr("runtime.io.datasets.pooch.HTTPDownloader", lambda timeout: _refused)
-        yield run("-o", folder / "out", "--quick"), folder / "out"
+        result = run("-o", folder / "out", "--quick")
+    return result, folder / "out"
 
 
 def _refused(url, output_file, pooch):
