@@ -27,6 +27,8 @@ from symgen.errors import DescriptionError
 
 Array = np.ndarray
 STARTS, STEPS, TOLERANCE = 60, 60, 1e-11
+STALLED = 12  # Newton steps without progress before a start is given up
+CLOSED = 1e-6  # residual below which two frames coincide
 INDEPENDENT_MOTIONS = 1e-7  # singular values below, relative to the largest and to 1, are no constraint (differences are good to 1e-9)
 
 
@@ -78,18 +80,24 @@ class LoopEquations:
         """All moving joints of one solution."""
         return {j: float(x) for j, x in self.all({i: np.asarray(x) for i, x in q.items()}).items()}
 
-    def closest(self, loop: Loop) -> float:
-        """Smallest residual of one loop over many descents."""
+    def closest(self) -> tuple[Loop, float, dict[int, float]]:
+        """Over several descents in all joints: the loop that stays open widest, its residual, and where."""
         rng = np.random.default_rng(4)
-        best = np.inf
+        best, at = np.inf, dict.fromkeys(self.free, 0.0)
         for _ in range(8):
             q = {j: float(rng.uniform(-np.pi, np.pi)) for j in self.free}
             for _ in range(STEPS):
                 r, J = self.linearised(q)
                 step = np.linalg.lstsq(J, -r, rcond=1e-6)[0]
                 q = {j: x + float(np.clip(dx, -0.5, 0.5)) for (j, x), dx in zip(q.items(), step, strict=True)}
-            best = min(best, float(np.abs(self.residual({j: np.array([x]) for j, x in q.items()}, loop)).max()))
-        return best
+            if self.gap(q) < best:
+                best, at = self.gap(q), q
+        loop = max(self.robot.loops, key=lambda loop: self.gap(at, loop))
+        return loop, self.gap(at, loop), at
+
+    def gap(self, q: Mapping[int, float], loop: Loop | None = None) -> float:
+        """Largest element of the residual at one configuration."""
+        return float(np.abs(self.residual({j: np.array([x]) for j, x in q.items()}, loop)).max(initial=0.0))
 
     def residual(self, q: Mapping[int, Array], loop: Loop | None = None) -> Array:
         """Difference of cut and twin frames, positions in units of the longest link, shape (equations, samples)."""
@@ -116,16 +124,20 @@ class LoopEquations:
         """Newton for the unknown joints from `q`; None where it does not close."""
         q = dict(q)
         columns = [self.free.index(j) for j in self.unknown]
+        best, stalled = np.inf, 0
         for _ in range(STEPS):
             r, J = self.linearised(q)
-            if np.abs(r).max(initial=0.0) < TOLERANCE:
+            gap = float(np.abs(r).max(initial=0.0))
+            if gap < TOLERANCE:
                 return q
+            best, stalled = (gap, 0) if gap < 0.95 * best else (best, stalled + 1)
+            if stalled > STALLED:
+                return None
             step = np.linalg.lstsq(J[:, columns], -r, rcond=1e-9)[0]
             scale = min(1.0, 0.5 / max(np.abs(step).max(initial=0.0), 1e-12))
             for j, dx in zip(self.unknown, step, strict=True):
                 q[j] += scale * dx
-        r = self.residual({j: np.array([x]) for j, x in q.items()})
-        return q if np.abs(r).max(initial=0.0) < 10 * TOLERANCE else None
+        return q if self.gap(q) < 10 * TOLERANCE else None
 
     def rates(self, q: Mapping[int, float]) -> Array:
         """G, shape (unknown, active): rates of the unknown joints."""
@@ -184,14 +196,18 @@ def find_relations(robot: Robot) -> Found:
 
 def _check_mobility(robot: Robot, equations: LoopEquations, q: Mapping[int, float]) -> None:
     freedoms, left = equations.mobility(q)
+    if freedoms != len(robot.joints) or left:
+        raise _wrong_mobility(robot, freedoms, left)
+
+
+def _wrong_mobility(robot: Robot, freedoms: int, left: int) -> DescriptionError:
     expected = len(robot.joints)
-    if freedoms != expected or left:
-        what = "over-constrained or has too many actuators" if freedoms < expected else "under-constrained or lacks actuators or relations"
-        raise DescriptionError(
-            f"mobility is {freedoms}, but {expected} joints are actuated ({list(robot.joints)})"
-            f"{f'; with them held, {left} freedoms are left' if left else ''}; the mechanism is {what}",
-            path=("loops",),
-        )
+    what = "over-constrained or has too many actuators" if freedoms < expected else "under-constrained or lacks actuators or relations"
+    return DescriptionError(
+        f"mobility is {freedoms}, but {expected} joints are actuated ({list(robot.joints)})"
+        f"{f'; with them held, {left} freedoms are left' if left else ''}; the mechanism is {what}",
+        path=("loops",),
+    )
 
 
 def _linear(
@@ -271,24 +287,55 @@ def _coincide(robot: Robot, found: Found) -> bool:
 
 
 def _cannot_close(robot: Robot, equations: LoopEquations) -> DescriptionError:
-    """Why no configuration closes: the declared relations, or the frames themselves."""
-    loop, gap = max(((loop, equations.closest(loop)) for loop in robot.loops), key=lambda found: found[1])
-    where = (
-        f"frame {loop.cut} (cut) and frame {loop.twin} (twin) cannot coincide; they come as close as {gap:.3g} (positions per longest link)"
-    )
+    """Why no configuration closes: the declared relations, the actuators, or the frames themselves."""
     in_loops = {j for loop in robot.loops for k in (loop.cut, loop.twin) for j in robot.path(k)}
     declared = {j: e for j, e in robot.constraints.items() if j in in_loops}
+    also = ""
     if declared:
-        kept = {j: e for j, e in robot.constraints.items() if j not in declared}
         try:
-            found = find_relations(replace(robot, constraints=kept))
+            found = find_relations(replace(robot, constraints={j: e for j, e in robot.constraints.items() if j not in declared}))
         except DescriptionError:
-            return DescriptionError(f"{where}, with or without the declared relations", path=("loops", robot.loops.index(loop)))
-        sides = [f"q{j}: declared {e}, the closure gives {_text(found, j)}" for j, e in declared.items() if j in found.row]
-        return DescriptionError(
-            f"declared relations contradict the closure; {'; '.join(sides)}; {where}", path=("constraints", f"q{min(declared)}")
-        )
-    return DescriptionError(f"{where}; check the lengths, alpha, theta and the row of the twin", path=("loops", robot.loops.index(loop)))
+            also = ", with or without the declared relations"
+        else:
+            return _contradiction(robot, equations, declared, found)
+    loop, gap, q = equations.closest()
+    if gap < CLOSED:
+        return _wrong_mobility(robot, *equations.mobility(q))
+    return DescriptionError(
+        f"frame {loop.cut} (cut) and frame {loop.twin} (twin) cannot coincide{also}; they come as close as {gap:.3g} (positions per longest link); "
+        "check the lengths, alpha, theta and the row of the twin",
+        path=("loops", robot.loops.index(loop)),
+    )
+
+
+def _contradiction(robot: Robot, equations: LoopEquations, declared: Mapping[int, Expression], found: Found) -> DescriptionError:
+    """Both sides of every declared relation that is not the closure's, and how far the loop is open with the declared ones."""
+    relations = declared_relations(robot)
+    sides = []
+    for j, e in declared.items():
+        if j not in found.row:
+            sides.append(f"q{j}: declared {e}, the closure gives no linear relation (these lengths make no parallelogram)")
+        elif not _same(robot, relations[j], found, j):
+            sides.append(f"q{j}: declared {e}, the closure gives {_text(found, j)}")
+    q = {j: found.start[j] for j in equations.free}
+    loop = max(robot.loops, key=lambda loop: equations.gap(q, loop))
+    return DescriptionError(
+        f"declared relations contradict the closure; {'; '.join(sides)}; with the declared ones frame {loop.cut} (cut) and frame {loop.twin} (twin) "
+        f"are {equations.gap(q, loop):.3g} apart (positions per longest link)",
+        path=("constraints", f"q{min(declared)}"),
+    )
+
+
+def _same(robot: Robot, relation: tuple[Mapping[int, Expression], Expression], found: Found, j: int) -> bool:
+    """Whether a declared relation is the found one, in the actuated joints, up to whole turns."""
+    row: dict[int, Expression] = {}
+    offset = relation[1]
+    for i, g in relation[0].items():
+        for k, n in found.row.get(i, {i: ONE}).items():
+            row[k] = row.get(k, ZERO) + g * n
+        offset = offset + g * found.offset.get(i, ZERO)
+    turn = (offset - found.offset[j]).value(robot.constants) / (2 * np.pi) if robot.frame(j).sigma == REVOLUTE else 0.0
+    return {k: n for k, n in row.items() if n} == dict(found.row[j]) and abs(turn - round(turn)) < 1e-9
 
 
 def _text(found: Found, j: int) -> str:
