@@ -43,7 +43,6 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_state
-
 from symgen.description.robot import Robot
 from symgen.description.yaml import load_robot
 from symgen.emit import generate_module

@@ -9,11 +9,11 @@ import pytest
 
 from oracles.random_robots import describe_mix, random_robot
 from symgen.derive import newton_euler
+from symgen.derive.exact import Draw
 from symgen.derive.lagrange import numeric_regressor
 from symgen.description import Robot, load_robot, packaged_robots
 from symgen.description.expression import Expression
 from symgen.regroup.certificate import certify, numeric_rank
-from symgen.derive.exact import Draw
 from symgen.regroup.regrouping import BaseParameter, Regrouping, regroup
 from symgen.regroup.solve import sample
 
