@@ -36,7 +36,7 @@ Cost per sample
     gravity           14 multiplications, 8 additions, 3 sin, 2 cos
     frame_poses       6 multiplications, 5 additions, 4 sin, 4 cos
     closure           12 multiplications, 9 additions, 4 sin, 4 cos
-    curvature         31 multiplications, 13 additions, 4 sin, 4 cos
+    curvature         33 multiplications, 17 additions, 4 sin, 4 cos
 """
 
 import numpy as np
@@ -77,6 +77,7 @@ _PATHS = {
     4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))), 5: ((3, 0, ((2, 1.0),)),),
 }
 _START = (1.0, -0.5518306301574998, 1.2956336780546933, 0.8474643082121931)
+_MODE = 1.0  # sign of det J_u in the assembly mode of _START
 
 
 class Store(np.ndarray):
@@ -221,7 +222,7 @@ def passive_joints(q, qd=None, qdd=None, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9
         [0, 0, 0, 1],
     ], dtype=float)
     offsets = np.array([0, 0, 0], dtype=float)
-    states = [x.reshape(*np.shape(q)[:-1], -1) for x in _closed(q, qd, qdd, L0, L1, L2, L3, g)[:3]]
+    states = [x.reshape(*np.shape(q)[:-1], 4) for x in _closed(q, qd, qdd, L0, L1, L2, L3, g)[:3]]
     found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
     found[0] += offsets
     return found[0] if len(found) == 1 else tuple(found)
@@ -236,15 +237,19 @@ def _closed(q, qd, qdd, *constants):
     q = np.concatenate([q, _assembled(q, *constants)], axis=1)
     J = _fill(_closure_block, np.empty((3, 5, N)), (q,), *constants)[:, 1:].transpose(2, 0, 1)
     J_a, J_u = J[..., :1], J[..., 1:]
-    volume = np.abs(np.linalg.det(J_u)) / np.prod(np.linalg.norm(J, axis=2), axis=1)
-    if N and volume.min() < 1e-9:
-        t = int(volume.argmin())
+    volume = np.linalg.det(J_u) / np.prod(np.linalg.norm(J, axis=2), axis=1)
+    if (np.abs(volume) < 1e-6).any():  # a dead point is found to half the digits of the closure
+        t = int(np.abs(volume).argmin())
         raise ValueError(f"singular configuration at sample {t}: q = {q[t, :1]}, tied joints {q[t, 1:]} move freely there")
     G = -np.linalg.solve(J_u, J_a)
     qd = np.concatenate([qd, np.einsum("tui,ti->tu", G, qd)], axis=1)
-    B = _fill(_curvature_block, np.empty((3, N)), (q, qd), *constants).T
-    qdd = np.concatenate([qdd, np.einsum("tui,ti->tu", G, qdd) - np.linalg.solve(J_u, B[..., None])[..., 0]], axis=1)
-    return q, qd, qdd, G.reshape(N, -1)
+    B = _fill(_curvature_block, np.empty((4, N)), (q, qd), *constants).T
+    other = (volume * _MODE < 0) | (B[:, 3:] < 0).any(axis=1)  # beyond a dead point, or frames opposite (trace -1, not 3)
+    if other.any():
+        t = int(other.argmax())
+        raise ValueError(f"the mechanism does not close in the assembly mode of _START at sample {t}: q = {q[t, :1]}")
+    qdd = np.concatenate([qdd, np.einsum("tui,ti->tu", G, qdd) - np.linalg.solve(J_u, B[:, :3, None])[..., 0]], axis=1)
+    return q, qd, qdd, G.reshape(N, 3)
 
 
 def _assembled(q, *constants):
@@ -254,19 +259,22 @@ def _assembled(q, *constants):
     """
     N = len(q)
     pace = np.abs(np.diff(q, axis=0)).max(initial=0.0)
-    every = int(np.clip(0.1 / max(pace, 1e-12), 1, 64)) if N > 64 else 1
+    every = int(np.clip(0.25 / max(pace, 1e-12), 1, 64)) if N > 64 else 1
     knots = np.unique(np.append(np.arange(0, N, every), N - 1)) if N else np.arange(0)
     start, x = np.array(_START[:1]), np.tile(_START[1:], (len(knots), 1))
-    steps = int(np.ceil(np.abs(q[knots] - start).max(initial=0.0) / 0.3))
+    turns = 2*np.pi*np.round((q[knots] - start) / (2*np.pi))  # joint 1 turns fully
+    away = q[knots] - turns - start
+    steps = int(np.ceil(np.abs(away).max(initial=0.0) / 0.2))
     for s in range(1, steps):
-        x, _ = _newton(start + s / steps * (q[knots] - start), x, 2, *constants)
+        x, _ = _newton(start + s / steps * away, x, 2, *constants)
+    x = x + turns * np.array((-1, 0, 0))  # turns of the tied joints per turn of joint 1
     x, residual = _newton(q[knots], x, 20, *constants)
     if every > 1:
         x = np.stack([np.interp(np.arange(N), knots, column) for column in x.T], axis=1)
         x, residual = _newton(q, x, 5, *constants)
-    if N and not residual.max() < 1e-10:
-        t = int(np.argmax(np.where(np.isnan(residual), np.inf, residual)))
-        raise ValueError(f"the mechanism does not close at sample {knots[t] if every == 1 else t}: residual {residual[t]:.3g} at q = {q[t]}")
+    if not (residual < 1e-10).all():
+        t = int((~(residual < 1e-10)).argmax())
+        raise ValueError(f"the mechanism does not close at sample {t}: residual {residual[t]:.3g} at q = {q[t]}")
     return x
 
 
@@ -638,7 +646,7 @@ def _closure_block(q, R, L0, L1, L2, L3, g):
 
 
 def _curvature_block(q, qd, B, L0, L1, L2, L3, g):
-    """Fill B, shape (3, N): second derivatives of the residuals at constant rates. q, qd: (4, N)."""
+    """Fill B, shape (3 + 1, N): second derivatives of the residuals at constant rates; trace of A_cut' A_twin. q, qd: (4, N)."""
     # Inputs
     q1, q2, q3, q4 = q
     QP1, QP2, QP3, QP4 = qd
@@ -662,7 +670,11 @@ def _curvature_block(q, qd, B, L0, L1, L2, L3, g):
     QP4pQP1pQP2 = QP4 + QP1pQP2
     S124QP4pQP1pQP2 = S124*QP4pQP1pQP2
     C124QP4pQP1pQP2 = C124*QP4pQP1pQP2
-    # Second derivatives at constant rates
+    # Loop: frame 5 on frame 4
+    C3C124 = C3*C124
+    S3S124 = S3*S124
+    # Second derivatives at constant rates; traces
     B[0] = L3*QP3QP3C3 - L1*QP1*QP1*C1 - L2*QP1pQP2*C12*QP1pQP2
     B[1] = L3*QP3QP3S3 - L1*QP1*QP1*S1 - L2*QP1pQP2*S12*QP1pQP2
     B[2] = -2*(S3*QP4pQP1pQP2*C124QP4pQP1pQP2 + QP3QP3S3*C124 + 2*QP3C3*S124QP4pQP1pQP2 - C3*QP4pQP1pQP2*S124QP4pQP1pQP2 - QP3QP3C3*S124 - 2*QP3S3*C124QP4pQP1pQP2)
+    B[3] = 1 + C3C124 + S3S124 + C3C124 + S3S124

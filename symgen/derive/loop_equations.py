@@ -8,6 +8,7 @@ orientations agree); `chosen` are the rows that determine the tied joints best a
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,7 +21,10 @@ from symgen.derive.jets import JetAlgebra, jet
 from symgen.derive.kinematics import frame_poses
 from symgen.derive.loops import close
 from symgen.derive.scalar import Algebra, Scalar, dot, sub
-from symgen.description.robot import Robot
+from symgen.description.robot import REVOLUTE, Robot
+
+Array = np.ndarray
+TURN_STEPS = 72  # of a full turn of the crank
 
 
 def residuals(robot: Robot, algebra: Algebra, closure: Closure) -> list[Scalar]:
@@ -48,6 +52,12 @@ class LoopSystem:
         rows = residuals(self.robot, algebra, self.closure)
         return [rows[k] for k in self.chosen]
 
+    def alignment(self, algebra: Algebra) -> list[Scalar]:
+        """Trace of A_cut' A_twin of every loop: 3 where it closes, -1 half a turn from there, where the axial vector is zero too."""
+        pose = frame_poses(Geometry(self.robot, algebra, self.closure))
+        rotations = [(pose[loop.cut][0], pose[loop.twin][0]) for loop in self.robot.loops]
+        return [dot([x for row in A for x in row], [x for row in B for x in row]) for A, B in rotations]
+
     def jacobian(self, algebra: Algebra) -> list[list[Scalar]]:
         """[equation][independent joint]."""
         columns = []
@@ -60,6 +70,34 @@ class LoopSystem:
         """Jd qd."""
         rows = residuals(self.robot, JetAlgebra(algebra, {i: algebra.qd(i) for i in self.closure.independent}), self.closure)
         return [jet(rows[k]).xdd for k in self.chosen]
+
+    def linearised(self, q: Mapping[int, float]) -> tuple[Array, Array]:
+        """Residuals (m,) and their derivatives by the tied joints (m, m), in floats."""
+        algebra = FloatAlgebra(self.robot, {j: np.asarray(x) for j, x in q.items()})
+        J = np.array([[float(x) for x in row] for row in self.jacobian(algebra)])
+        return np.array([float(x) for x in self.residual(algebra)]), J[:, len(self.robot.joints) :]
+
+    def mode(self) -> float:
+        """Sign of det J_u at the start: it stays as long as the mechanism passes no dead point, hence in one assembly mode."""
+        return float(np.sign(np.linalg.det(self.linearised(self.closure.start)[1])))
+
+    def turn(self) -> tuple[int, ...] | None:
+        """Whole turns of the tied joints per turn of the actuated one; None where it cannot turn fully or is not the only one."""
+        (j, *more), tied = self.robot.joints, self.closure.tied
+        if more or self.robot.frame(j).sigma != REVOLUTE:
+            return None
+        q = {i: self.closure.start[i] for i in self.closure.independent}
+        for _ in range(TURN_STEPS):
+            q[j] += 2 * np.pi / TURN_STEPS
+            for _ in range(5):
+                r, J = self.linearised(q)
+                q |= {u: q[u] - dx for u, dx in zip(tied, np.linalg.solve(J + 1e-14 * np.eye(len(tied)), r), strict=True)}
+            if np.abs(r).max() > 1e-6 or np.linalg.det(J) * self.mode() <= 0:
+                return None
+        gained = {u: q[u] - self.closure.start[u] for u in tied}
+        if any(self.robot.frame(u).sigma != REVOLUTE and abs(x) > 1e-6 for u, x in gained.items()):
+            return None
+        return tuple(round(x / (2 * np.pi)) for x in gained.values())
 
 
 @lru_cache(maxsize=64)

@@ -8,6 +8,7 @@ from textwrap import wrap
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from symgen.derive.loop_equations import loop_system
 from symgen.derive.loops import close
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.header import header, literal, packed, tables
@@ -30,7 +31,10 @@ SUMMARIES = {
 }
 LOOP_SUMMARIES = {
     "closure": ("q, R", "Fill R, shape ({m}, 1 + {k}, N): closure residuals, then their derivatives by the joints. q: ({k}, N)."),
-    "curvature": ("q, qd, B", "Fill B, shape ({m}, N): second derivatives of the residuals at constant rates. q, qd: ({k}, N)."),
+    "curvature": (
+        "q, qd, B",
+        "Fill B, shape ({m} + {loops}, N): second derivatives of the residuals at constant rates; trace of A_cut' A_twin. q, qd: ({k}, N).",
+    ),
 }
 
 
@@ -54,6 +58,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         "k": len(closure.independent),
         "b": len(regrouping),
         "frames": len(robot.frames),
+        "loops": len(robot.loops),
         "p": len(robot.parameters),
     }
     context = {
@@ -66,6 +71,8 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         "size": BLOCK,
         "header": [plain(line) for line in header(spec)],
         "general": general,
+        "turn": loop_system(robot).turn() if general else None,
+        "joint": robot.joints[0],
         "passive": bool(robot.passive),
         "passive_rows": _passive_rows(robot),
         "tables": [*tables(spec), *_paths(robot)],
@@ -136,5 +143,7 @@ def _paths(robot: Robot) -> list[str]:
         paths[f.j] = tuple(
             (m.j, m.sigma, tuple((column[i], float(g.value(robot.constants))) for i, g in closure.row[m.j].items())) for m in moving
         )
-    start = [f"_START = {tuple(closure.start[j] for j in closure.independent)!r}"] if closure.tied else []
-    return [*literal("_PATHS", paths), *start]
+    if not closure.tied:
+        return literal("_PATHS", paths)
+    start = [f"_START = {tuple(closure.start[j] for j in closure.independent)!r}"]
+    return [*literal("_PATHS", paths), *start, f"_MODE = {loop_system(robot).mode()}  # sign of det J_u in the assembly mode of _START"]

@@ -61,7 +61,7 @@ class ModuleSpec:
     gravity: Function
     frame_poses: Function
     closure: Function | None = None  # general loops: residual and Jacobian of the closure equations
-    curvature: Function | None = None  # general loops: Jd qd
+    curvature: Function | None = None  # general loops: Jd qd, alignment of the frames
 
     @property
     def tied(self) -> tuple[int, ...]:
@@ -230,8 +230,8 @@ def _closure(robot: Robot) -> Function:
 
 def _curvature(robot: Robot) -> Function:
     algebra, system = GraphAlgebra(robot), loop_system(robot)
-    entries = [(f"B[{k}]", x) for k, x in enumerate(system.curvature(algebra))]
-    return _assignments(robot, algebra, entries, "Second derivatives at constant rates")
+    values = [*system.curvature(algebra), *system.alignment(algebra)]
+    return _assignments(robot, algebra, [(f"B[{k}]", x) for k, x in enumerate(values)], "Second derivatives at constant rates; traces")
 
 
 def _assignments(robot: Robot, algebra: GraphAlgebra, entries: Sequence[tuple[str, Scalar | int]], title: str) -> Function:

@@ -165,7 +165,14 @@ class PreciseResidues:
         self.robot, self.supports = robot, supports
         self.p = primes_for(2, 1)[0]
         in_angles = {name for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for name in e.symbols}
-        in_calls = {name for f in robot.frames for e in (f.b, f.d, f.r0, *robot.gravity) for a in e.atoms if isinstance(a, Call) for name in a.argument.symbols}
+        in_calls = {
+            name
+            for f in robot.frames
+            for e in (f.b, f.d, f.r0, *robot.gravity)
+            for a in e.atoms
+            if isinstance(a, Call)
+            for name in a.argument.symbols
+        }
         self.variables: tuple[Variable, ...] = tuple(name for name in robot.constants if name not in in_angles | in_calls)
         self.rng = np.random.default_rng(2)
         self.fraction: dict[tuple[Variable, int], Fraction] = {}
@@ -259,7 +266,9 @@ def _numeric(robot: Robot, base: tuple[str, ...], missing: list[str]) -> dict[st
     return result
 
 
-def identities(robot: Robot, own: Sequence[str], names: Sequence[str], K: dict[str, dict[str, Expression]], seed: int, exact: bool) -> tuple[int, list[str]]:
+def identities(
+    robot: Robot, own: Sequence[str], names: Sequence[str], K: dict[str, dict[str, Expression]], seed: int, exact: bool
+) -> tuple[int, list[str]]:
     """(rank of the base columns, standard columns that are not what K says) at fresh states, and fresh lengths if the formulas are exact."""
     with mpmath.workdps(DIGITS):
         geometry = nearby_geometry(robot, seed) if exact else default_geometry(robot)
@@ -271,7 +280,9 @@ def identities(robot: Robot, own: Sequence[str], names: Sequence[str], K: dict[s
         tolerance = TOLERANCE if exact else mpmath.mpf(10) ** -9
         for name in names:
             terms = [(column[o], mpmath.mpf(algebra.constant(c))) for o, c in K.get(name, {}).items()]
-            size = max(max(abs(row[column[name]]) for row in W), max((abs(c * row[o]) for row in W for o, c in terms), default=mpmath.mpf(0)))
+            size = max(
+                max(abs(row[column[name]]) for row in W), max((abs(c * row[o]) for row in W for o, c in terms), default=mpmath.mpf(0))
+            )
             if any(abs(row[column[name]] - sum(c * row[o] for o, c in terms)) > tolerance * size for row in W):
                 wrong.append(name)
         return rank, wrong
