@@ -1,0 +1,278 @@
+"""Closed loops: relations found, counts and formulas of parallelograms and general loops, certificates, and mechanisms that cannot be.
+
+Counts are those of an SVD of the regressor at random closed states; haptic branch: 21 inertial (Ia included) and 9 of friction and offsets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from symgen.derive.loops import close
+from symgen.description import Robot, load_robot
+from symgen.description.expression import ONE
+from symgen.description.grammar import parse
+from symgen.description.robot import FIXED, Element, Frame
+from symgen.errors import DescriptionError
+from symgen.regroup.certificate import certify
+from symgen.regroup.regrouping import BaseParameter, Regrouping, regroup
+
+# chapter, Table 6: the names with an R, fC as FS
+TABLE_6_R = {"ZZ1R", "MY1R", "XX2R", "ZZ2R", "MX2R", "FS2R", "XX3R", "ZZ3R", "MX3R", "MX5R", "FS5R"}
+TABLE_6_PLAIN = {"FS1", "OFFSET2", "OFFSET5"}
+# theory of the branch: what else absorbs others; MX4 only where the constant c of q4 is kept as a symbol
+ALSO_R = {"XY2R", "XZ2R", "YZ2R", "XY3R", "XZ3R", "YZ3R", "MX4R", "FV2R", "FV5R"}
+
+
+@cache
+def regrouped(name: str) -> Regrouping:
+    return regroup(load_robot(name))
+
+
+def haptic(**changes: str) -> Robot:
+    """The haptic branch with other constraints."""
+    robot = load_robot("haptic")
+    symbols = {*robot.constants, *(f"q{j}" for j in robot.moving)}
+    return replace(robot, constraints={int(q[1:]): parse(text, symbols) for q, text in changes.items()})
+
+
+def changed(robot: Robot, j: int, **fields: object) -> Robot:
+    """The robot with some entries of one row of the table changed; texts are expressions."""
+    symbols = {*robot.constants, f"q{j}"}
+    read = {key: parse(value, symbols) if isinstance(value, str) else value for key, value in fields.items()}
+    frames = tuple(replace(f, **read) if f.j == j else f for f in robot.frames)  # type: ignore[arg-type]
+    return replace(robot, frames=frames, drives=None, limits={})
+
+
+def rubbed(robot: Robot, joints: tuple[int, ...]) -> Robot:
+    """FV and FS on the given joints, nothing else of the file's friction."""
+    each = {j: {j: ONE} for j in joints}
+    friction = (Element("FV", "viscous", each, {}), Element("FS", "coulomb", each, {}))
+    return replace(robot, elements=(*(e for e in robot.elements if e.kind in ("inertia", "offset")), *friction), values={})
+
+
+def relations(robot: Robot) -> dict[int, str]:
+    closure = close(robot)
+    found = {}
+    for j in robot.passive:
+        total = closure.offset[j]
+        for i, n in closure.row[j].items():
+            total = total + n * parse(f"q{i}", (f"q{i}",))
+        found[j] = str(total)
+    return found
+
+
+# --- relations ---------------------------------------------------------------------------------------------------------
+
+
+def test_relations_of_the_haptic_branch() -> None:
+    """q3 = q5 - q2 + pi, q6 = q2 - q5, q7 = q3 from the table alone; q4 = c - q5 declared."""
+    assert relations(load_robot("haptic")) == {3: "pi - q2 + q5", 4: "c - q5", 6: "q2 - q5", 7: "pi - q2 + q5"}
+
+
+def test_relations_of_the_sr400() -> None:
+    """The angle between arm and forearm follows motor 7: q3 = pi/2 - q2 + q7, q8 = q2 - q7, q9 = pi - q2 + q7."""
+    assert relations(load_robot("sr400")) == {3: "pi/2 - q2 + q7", 8: "q2 - q7", 9: "pi - q2 + q7"}
+
+
+def test_declared_relations_that_agree_change_nothing() -> None:
+    declared = haptic(q4="c - q5", q3="q5 - q2 - pi", q6="q2 - q5", q7="q3")
+    assert {j: text.replace("-pi", "pi") for j, text in relations(declared).items()} == relations(load_robot("haptic"))
+
+
+@pytest.mark.parametrize(("name", "tied"), [("four_bar", (2, 3, 4)), ("five_bar", (2, 4, 5))])
+def test_general_loops_have_no_linear_relation(name: str, tied: tuple[int, ...]) -> None:
+    """They keep the assembly mode of the file: the configuration found is the one of `start`."""
+    robot = load_robot(name)
+    closure = close(robot)
+    assert closure.tied == tied
+    assert {j: closure.start[j] for j in robot.loops[0].start} == pytest.approx(dict(robot.loops[0].start), abs=1e-3)
+
+
+def test_equal_numbers_are_no_parallelogram() -> None:
+    """0.2 in place of the symbol D3: closed for these lengths only, so nothing linear is claimed."""
+    assert close(changed(load_robot("haptic"), 7, d="0.2")).tied
+
+
+# --- counts ------------------------------------------------------------------------------------------------------------
+
+
+def test_haptic_base_parameters() -> None:
+    found = regrouped("haptic")
+    assert (len(found.robot.parameters), len(found)) == (78, 30)
+    assert sum(name[:2] not in ("FV", "FS", "OF") for name in found.names) == 21
+    assert {name for name in found.names if name.endswith("R")} == TABLE_6_R | ALSO_R
+    assert set(found.names) >= TABLE_6_R | TABLE_6_PLAIN
+
+
+def test_haptic_with_c_a_right_angle() -> None:
+    """q4 = -q5 as a number: MX4 absorbs nothing, the other names stay."""
+    found = regroup(haptic(q4="-q5"))
+    assert len(found) == 30
+    assert {name for name in found.names if name.endswith("R")} == TABLE_6_R | ALSO_R - {"MX4R"}
+
+
+@pytest.mark.parametrize(
+    ("what", "robot", "parameters", "count"),
+    [
+        ("friction of the motors alone", lambda: rubbed(load_robot("haptic"), (1, 2, 5)), 72, 30),
+        ("joint 4 too, which falls into joint 5", lambda: rubbed(load_robot("haptic"), (1, 2, 4, 5)), 74, 30),
+        ("joint 3 too", lambda: rubbed(load_robot("haptic"), (1, 2, 3, 5)), 74, 32),
+        ("every joint", lambda: rubbed(load_robot("haptic"), (1, 2, 3, 4, 5, 6, 7)), 80, 32),
+        ("gravity along z1", lambda: replace(load_robot("haptic"), gravity=(parse("0"), parse("0"), parse("gx", ("gx",)))), 78, 28),
+        ("link 4 turning against the arm", lambda: rubbed(haptic(q4="c - q2"), (1, 2, 5)), 72, 36),
+        ("link 4 turning with q5 - q2", lambda: rubbed(haptic(q4="c + q5 - q2"), (1, 2, 5)), 72, 36),
+        ("SR400, friction of every joint", lambda: rubbed(load_robot("sr400"), (1, 2, 3, 4, 5, 6, 7, 8, 9)), 110, 62),
+    ],
+)
+def test_counts_of_variants(what: str, robot, parameters: int, count: int) -> None:
+    r = robot()
+    assert (len(r.parameters), len(regroup(r))) == (parameters, count), what
+
+
+def test_sr400_count() -> None:
+    """Friction of the actuated joints: 42 inertial and 18."""
+    assert (len(load_robot("sr400").parameters), len(regrouped("sr400"))) == (104, 60)
+
+
+# --- formulas ----------------------------------------------------------------------------------------------------------
+
+
+def test_friction_of_the_haptic_branch() -> None:
+    """The pivots at +-qd2 and joint 4 with the pivots at +-qd5 are why fC2 and fC5 carry an R in Table 6, and fC1 none."""
+    formulas = {b.name: b.formula for b in regrouped("haptic").base}
+    assert formulas["FS2R"] == "FS2 + FSP2"
+    assert formulas["FS5R"] == "FS5 + FS4 + FSP5"
+    assert formulas["FS1"] == "FS1"
+
+
+def test_four_bar() -> None:
+    """D_MX3 = (L1**2 D_ZZ1 + L1 D_MX1 + L2**2 D_ZZ2 + L2 D_MX2)/L3 - L3 D_ZZ3, x axes along the bars; M2 falls into the crank, M3 has no effect."""
+    found = regrouped("four_bar")
+    assert (len(found.robot.parameters), len(found)) == (34, 11)
+    expected = {"ZZ1R": "L1**2/L3", "MX1R": "L1/L3", "ZZ2R": "L2**2/L3", "MX2R": "L2/L3", "ZZ3R": "-L3"}
+    assert {b.name: str(b.combination["MX3"]) for b in found.base if "MX3" in b.combination} == expected
+    assert {b.name: str(b.combination["M2"]) for b in found.base if "M2" in b.combination} == {"ZZ1R": "L1**2", "MX1R": "L1"}
+    assert "M3" in found.no_effect and "MX3" not in found.own
+    k = found.names.index("MX2R")
+    wrong = BaseParameter("MX2R", "MX2", {**found.base[k].combination, "MX3": -found.base[k].combination["MX3"]})
+    assert certify(found).valid
+    assert not certify(replace(found, base=(*found.base[:k], wrong, *found.base[k + 1 :]))).valid
+
+
+def test_five_bar() -> None:
+    """MX4 goes round the loop: both rods and both cranks, with the signs of the closure."""
+    found = regrouped("five_bar")
+    assert (len(found.robot.parameters), len(found)) == (48, 17)
+    expected = {
+        "ZZ1R": "L1**2/L4",
+        "MX1R": "L1/L4",
+        "ZZ2R": "L2**2/L4",
+        "MX2R": "L2/L4",
+        "ZZ3R": "-L3**2/L4",
+        "MX3R": "-L3/L4",
+        "ZZ4R": "-L4",
+    }
+    assert {b.name: str(b.combination["MX4"]) for b in found.base if "MX4" in b.combination} == expected
+
+
+# --- certificates ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["haptic", "sr400"])
+def test_certified_and_every_perturbed_coefficient_caught(name: str) -> None:
+    regrouping = regrouped(name)
+    assert certify(regrouping).valid
+    for k, b in enumerate(regrouping.base):
+        for parameter, c in b.combination.items():
+            if parameter != b.own:
+                wrong = BaseParameter(b.name, b.own, {**b.combination, parameter: c * 2})
+                assert not certify(replace(regrouping, base=(*regrouping.base[:k], wrong, *regrouping.base[k + 1 :]))).valid, (
+                    b.name,
+                    parameter,
+                )
+
+
+# --- mechanisms that cannot be -----------------------------------------------------------------------------------------
+
+
+def test_frames_that_cannot_coincide() -> None:
+    """alpha5 = +pi/2 in Table 5: the two planes are turned against each other."""
+    with pytest.raises(DescriptionError, match=r"frame 7 \(cut\) and frame 8 \(twin\) cannot coincide; they come as close as 1\.86"):
+        close(changed(load_robot("haptic"), 5, alpha="pi/2"))
+
+
+def test_sides_too_long() -> None:
+    robot = load_robot("four_bar")
+    with pytest.raises(DescriptionError, match=r"frame 4 \(cut\) and frame 5 \(twin\) cannot coincide; they come as close as 0\.\d+"):
+        close(replace(robot, constants=dict(robot.constants) | {"L0": 1.5}))
+
+
+def test_twin_must_be_fixed() -> None:
+    with pytest.raises(DescriptionError, match="twin frame 8 has sigma 0; expected 2"):
+        changed(load_robot("haptic"), 8, sigma=0, theta="q8")
+
+
+def test_too_many_actuators() -> None:
+    with pytest.raises(
+        DescriptionError, match=r"mobility is 3, but 4 joints are actuated \(\[1, 2, 3, 5\]\); the mechanism is over-constrained"
+    ):
+        close(changed(load_robot("haptic"), 3, mu=1))
+
+
+def test_too_few_actuators() -> None:
+    with pytest.raises(DescriptionError, match=r"mobility is 3, but 2 joints are actuated .* 1 freedoms are left; .* under-constrained"):
+        close(changed(load_robot("haptic"), 5, mu=0))
+
+
+def test_over_constrained_mechanism() -> None:
+    """A diagonal bar between arm 2 and crank 5 freezes the parallelogram: it turns as a whole, no more."""
+    robot = load_robot("haptic")
+    zero = parse("0")
+    bar = Frame(9, 2, 0, 0, zero, zero, zero, parse("0.07"), parse("q9", ("q9",)), zero)
+    end = Frame(10, 9, 0, 0, zero, zero, zero, parse("0.1"), parse("q10", ("q10",)), zero)
+    twin = Frame(11, 5, FIXED, 0, zero, zero, zero, parse("0.05"), zero, zero)
+    loops = (*robot.loops, replace(robot.loops[0], cut=10, twin=11))
+    with pytest.raises(DescriptionError, match="mobility is 2, but 3 joints are actuated"):
+        close(replace(robot, frames=(*robot.frames, bar, end, twin), loops=loops))
+
+
+def test_passive_joint_without_relation() -> None:
+    with pytest.raises(DescriptionError, match="passive joint 4 has no relation: it is in no loop; declare q4 under constraints"):
+        close(haptic())
+
+
+@pytest.mark.parametrize("wrong", ["q5 - q2", "q5 + q2 + pi"])
+def test_declared_relation_that_contradicts_the_closure(wrong: str) -> None:
+    """Both sides, and how far frames 7 and 8 are apart with the declared one."""
+    with pytest.raises(
+        DescriptionError, match=r"q3: declared .*, the closure gives pi - q2 \+ q5; .* frame 7 \(cut\) and frame 8 .* are 1\.\d+ apart"
+    ):
+        close(haptic(q4="c - q5", q3=wrong))
+
+
+def test_only_the_wrong_one_is_named() -> None:
+    with pytest.raises(DescriptionError, match="closure; q7: declared") as error:
+        close(haptic(q4="c - q5", q3="q5 - q2 + pi", q6="q2 - q5", q7="q3 + pi"))
+    assert "q3: declared" not in str(error.value) and "q6: declared" not in str(error.value)
+
+
+def test_lengths_that_make_a_declared_parallelogram_impossible() -> None:
+    unequal = changed(haptic(q4="c - q5", q3="q5 - q2 + pi"), 7, d="0.25")
+    with pytest.raises(
+        DescriptionError, match=r"q3: declared pi - q2 \+ q5, the closure gives no linear relation \(these lengths make no parallelogram\)"
+    ):
+        close(unequal)
+    with pytest.raises(DescriptionError, match=r"cannot coincide, with or without the declared relations; they come as close as 0\.6"):
+        close(changed(unequal, 7, d="0.9"))
+
+
+def test_parallelogram_is_never_the_crossed_one() -> None:
+    """Starts of Newton near the other branch do not change what is found: G is whole and constant."""
+    closure = close(load_robot("sr400"))
+    assert closure.tied == ()
+    assert all(n.constant in (1, -1) for j in (3, 8, 9) for n in closure.row[j].values())
+    assert np.isfinite(list(closure.start.values())).all()
