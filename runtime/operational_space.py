@@ -11,7 +11,8 @@ Gamma_f = (H(q, qd) - H(q, -qd))/2 at qd = J^+ u v is the part of the bias H tha
 called. All four are linear in the parameters or, for Lambda, have the derivative dLambda = B' dA B with B = A^-1 J' Lambda; deviations follow from the
 covariance of the Estimate, eq. (10), by linearisation. Closed loops: the columns of J are the actuated joints.
 
-Where J loses rank there is no such thing as a mass at the handle: those configurations are marked and hold nan. They are not smoothed over.
+Where J loses rank there is no such thing as a mass at the handle, and where the estimated A is not positive definite there is no dynamics: those
+configurations are marked and hold nan. They are not smoothed over.
 
 O. Khatib, A unified approach for motion and force control of robot manipulators: the operational space formulation, IEEE J. Robotics and
 Automation 3(1), 1987.
@@ -53,6 +54,7 @@ class OperationalSpace:
     """What is felt at N configurations, in m coordinates of frame 0 (`axes`). SI: m, kg, N, N/m.
 
     position : ndarray, shape (N, 3), of the handle.   singular : bool, shape (N,).   conditioning : shape (N,), smallest over largest singular value of J.
+    indefinite : bool, shape (N,), where the estimated A is not positive definite.
     mass : (N, m, m), Lambda.   principal : (N, m), its eigenvalues, ascending, along the columns of `directions`, (N, m, m).
     friction : (N, m), for motion along each coordinate.   static_force : (N, m).   stiffness : (N, m, m).
     """
@@ -60,6 +62,7 @@ class OperationalSpace:
     position: Array
     singular: Array
     conditioning: Array
+    indefinite: Array
     mass: Felt
     principal: Felt
     directions: Array
@@ -69,14 +72,19 @@ class OperationalSpace:
 
     @property
     def message(self) -> str:
-        """How many configurations are singular, and the first one's number, from 0; empty where none is."""
-        if not self.singular.any():
-            return ""
-        first = int(np.argmax(self.singular))
-        return (
-            f"{int(self.singular.sum())} of {len(self.singular)} configurations are singular (first: {first}, conditioning "
-            f"{self.conditioning[first]:.2g}); nothing is told there."
-        )
+        """How many configurations are left out, why, and the first one's number, from 0; empty where none is."""
+        parts = []
+        if self.singular.any():
+            first = int(np.argmax(self.singular))
+            parts.append(
+                f"{int(self.singular.sum())} of {len(self.singular)} configurations are singular (first: {first}, conditioning {self.conditioning[first]:.2g})"
+            )
+        if self.indefinite.any():
+            first = int(np.argmax(self.indefinite))
+            parts.append(
+                f"at {int(self.indefinite.sum())} of {len(self.indefinite)} the estimated inertia matrix is not positive definite (first: {first})"
+            )
+        return "; ".join(parts) + "; nothing is told there." if parts else ""
 
 
 def operational_space(
@@ -108,6 +116,9 @@ def operational_space(
         raise InputError(
             f"axes {tuple(axes)}; expected at most {n} different ones of 0, 1, 2: {n} actuated joints move a handle in no more directions"
         )
+    frames = len(model.frame_poses(q[0], **dict(constants or {})))  # type: ignore[attr-defined]
+    if not (frame is None or 1 <= frame <= frames) or not speed > 0:
+        raise InputError(f"{model.NAME}: frame {frame}, speed {speed} m/s; expected a frame from 1 to {frames} and a positive speed")
     X, C = parameters_of(model, estimate)
     handle = _Handle(model, q, frame, list(axes), dict(constants or {}), singular, X)
     mass = _felt(handle.mass, X, C)
@@ -115,8 +126,9 @@ def operational_space(
     along = _felt(lambda X: _array("nap,nab,nbp->np", directions, handle.mass(X), directions), X, C)
     return OperationalSpace(
         position=handle.position,
-        singular=handle.lost,
+        singular=handle.singular,
         conditioning=handle.conditioning,
+        indefinite=handle.indefinite,
         mass=mass,
         principal=Felt(principal, along.sigma),
         directions=directions,
@@ -139,10 +151,12 @@ class _Handle:
         J = self.jacobian(q)
         s = np.linalg.svd(J, compute_uv=False)
         self.conditioning = s[:, -1] / s[:, 0]
-        self.lost = ~(self.conditioning >= singular)
+        A = np.asarray(model.inertia_matrix(q, X, **constants))
+        self.singular, self.indefinite = ~(self.conditioning >= singular), ~(np.linalg.eigvalsh(A)[:, 0] > 0)
+        self.lost = self.singular | self.indefinite
         self.inverse = self.inverted(J)
         JT = np.swapaxes(J, 1, 2)[~self.lost]
-        weighted = np.linalg.solve(np.asarray(model.inertia_matrix(q, X, **constants))[~self.lost], JT)  # A^-1 J'
+        weighted = np.linalg.solve(A[~self.lost], JT)  # A^-1 J'
         self.B = np.full_like(self.inverse, np.nan)
         self.B[~self.lost] = weighted @ np.linalg.inv(J[~self.lost] @ weighted)
 

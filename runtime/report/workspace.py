@@ -19,10 +19,11 @@ Array = np.ndarray
 
 def panels(seen: OperationalSpace) -> dict[str, tuple[Array, Array]]:
     """(values, deviations), each of shape (N,), by title."""
+    lost = seen.singular | seen.indefinite
     last = seen.principal.value.shape[1] - 1
-    strongest = np.argmax(np.where(seen.singular[:, None], 0.0, seen.friction.value), axis=1)
-    stiff = np.abs(seen.stiffness.value).reshape(len(seen.singular), -1)
-    stiffest = np.argmax(np.where(seen.singular[:, None], 0.0, stiff), axis=1)
+    strongest = np.argmax(np.where(lost[:, None], 0.0, seen.friction.value), axis=1)
+    stiff = np.abs(seen.stiffness.value).reshape(len(lost), -1)
+    stiffest = np.argmax(np.where(lost[:, None], 0.0, stiff), axis=1)
 
     def picked(values: Array, which: Array) -> Array:
         return np.asarray(np.take_along_axis(values, which[:, None], axis=1)[:, 0])

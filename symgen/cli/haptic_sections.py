@@ -19,6 +19,8 @@ ASSUMED = (
     f"Assumed, since the chapter does not give it: all lengths, the direction of gravity, the double parallelogram as q4 = c - q5, the ratio of the cable "
     f"transmissions (10), sampling at {record.RATE:g} Hz, white torque noise of {100 * record.NOISE:g} % of the largest torque of each motor before the filters, the "
     "frequencies and amplitudes. Masses and inertias are one consistent set with the values of Table 6; what Table 6 leaves out is small there.",
+    "Ratio and sampling rate were fixed first, before any figure of Table 7 was computed, and left alone since. The sinusoids were drawn for a small cond(W); "
+    "the noise, and the size of what Table 6 leaves out, are such that the chapter's fourteen parameters are the essential ones: that count is put in, not found.",
     "The ratio decides how far a motor step moves the joint: %e depends on Delta divided by the ratio, and on the sampling rate, over which the filters "
     "average. The order of Table 7 is therefore met for this ratio and rate, not proved; the table of other ratios shows what others would give.",
 )  # fmt: skip

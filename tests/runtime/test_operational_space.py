@@ -143,6 +143,16 @@ def test_singular_configurations_are_told(arm):
         assert np.isfinite(felt.value[0]).all()
 
 
+def test_an_estimate_without_dynamics_is_told(arm):
+    """ZZ2 + Ia2 negative: A is not positive definite anywhere."""
+    fit = random_estimate(arm)
+    X = np.where([name == "ZZ2" for name in fit.names], -0.5, fit.X)
+    seen = operational_space(arm, estimate(fit.names, X), Q, axes=PLANE)
+    assert seen.indefinite.all() and not seen.singular.any()
+    assert "at 4 of 4 the estimated inertia matrix is not positive definite (first: 0)" in seen.message
+    assert np.isnan(seen.principal.value).all()
+
+
 def test_one_axis_of_a_redundant_arm(arm):
     """With one coordinate of two, the other joint motion is free: 1/Lambda is the diagonal element of the mobility."""
     fit = random_estimate(arm)
@@ -165,6 +175,22 @@ def test_haptic_handle_accelerates_as_its_mass_says(haptic):
     assert (seen.principal.value > 0).all()
 
 
+def test_general_loop(tmp_path):
+    """Tool point of the five-bar linkage: Lambda xdd = f from the forward dynamics; the columns of J are the actuated joints."""
+    model = emitted(load_robot("five_bar"), tmp_path)
+    X = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)
+    for j, length in ((1, 0.25), (2, 0.36), (3, 0.27), (4, 0.34)):
+        X |= {f"M{j}": 1.0, f"MX{j}": length / 2, f"ZZ{j}": length**2 / 3}
+    fit = estimate(model.BASE_PARAMETERS, model.base_parameters(X))
+    q = np.array([[2.2, 0.9], [2.3, 1.0]])
+    seen = operational_space(model, fit, q, frame=5, axes=PLANE)
+    J, rest = model.jacobian(q, frame=5)[:, :2], np.zeros_like(q)
+    for f in np.eye(2):
+        tau = model.bias(q, rest, fit.X) + np.einsum("naj,a->nj", J, f)
+        xdd = np.einsum("naj,nj->na", J, model.forward_dynamics(q, rest, tau, fit.X))
+        np.testing.assert_allclose(np.einsum("nab,nb->na", seen.mass.value, xdd), np.broadcast_to(f, (2, 2)), atol=1e-9)
+
+
 def test_essential_parameters_alone(haptic):
     """Parameters left out count as zero; the order of the names does not matter."""
     X = dict(zip(haptic.BASE_PARAMETERS, haptic.base_parameters(haptic.VALUES), strict=True))
@@ -182,5 +208,9 @@ def test_bad_input(arm):
         operational_space(arm, fit, np.zeros(3))
     with pytest.raises(InputError, match="at most 2 different ones"):
         operational_space(arm, fit, Q)
+    with pytest.raises(InputError, match=r"frame 9, speed 0.001 m/s; expected a frame from 1 to 3"):
+        operational_space(arm, fit, Q, axes=PLANE, frame=9)
+    with pytest.raises(InputError, match=r"speed 0 m/s; .* positive speed"):
+        operational_space(arm, fit, Q, axes=PLANE, speed=0)
     with pytest.raises(InputError, match="FS9: not base parameters of planar_2r"):
         operational_space(arm, estimate(["FS9"], np.ones(1)), Q, axes=PLANE)
