@@ -11,6 +11,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import ClassVar
 
 from symgen.derive.graph import ADD, CONST, COS, INV, MUL, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
 from symgen.errors import SymgenError
@@ -28,7 +29,14 @@ class Section:
 
 
 class Text:
-    """The lines of one function: `sections`, then an expression for each output by `expression`."""
+    """The lines of one function: `sections`, then an expression for each output by `expression`.
+
+    What is particular to Python and NumPy stands in the attributes and short methods that a printer of another language replaces.
+    """
+
+    calls: ClassVar[dict[str, str]] = CALLS
+    one: ClassVar[str] = "1"
+    pi: ClassVar[str] = "np.pi"
 
     def __init__(self, outputs: Sequence[Scalar | int], headings: Sequence[tuple[int, str]], taken: Iterable[str]) -> None:
         self.nodes = reachable(outputs)
@@ -39,8 +47,8 @@ class Text:
         self.called: dict[int, str] = {}
         for node in self.nodes:
             if node.op == SYM:
-                self.called[node.index] = "np.pi" if node.value == "pi" else str(node.value)
-        self.named = {node.index for node in self.nodes if node.op not in (SYM, CONST) and (node.name or self.uses[node.index] > 1)}
+                self.called[node.index] = self.pi if node.value == "pi" else self._symbol(str(node.value))
+        self.named = {node.index for node in self.nodes if node.op not in (SYM, CONST) and self._has_line(node)}
         self._assign_names()
         self.sections = self._sections(headings)
 
@@ -58,6 +66,22 @@ class Text:
     def trigonometry(self) -> tuple[int, int]:
         """(sines, cosines) in the text."""
         return sum(n.op == SIN for n in self.nodes), sum(n.op == COS for n in self.nodes)
+
+    def _symbol(self, name: str) -> str:
+        return name
+
+    def _has_line(self, node: Node) -> bool:
+        return bool(node.name) or self.uses[node.index] > 1
+
+    def _number(self, c: Fraction) -> str:
+        return number(c)
+
+    def _square(self, factor: str) -> str:
+        return f"{factor}**2"
+
+    def _clipped(self, x: str, bound: str) -> str:
+        """The part of x above (`maximum`) or below (`minimum`) zero."""
+        return f"np.{bound}({x}, 0.0)"
 
     def _assign_names(self) -> None:
         for node in self.nodes:
@@ -146,7 +170,7 @@ class Text:
         node = s.node
         match node.op:
             case "const":
-                return ("-" if s.sign < 0 else "") + number(node.value)
+                return ("-" if s.sign < 0 else "") + self._number(node.value)
             case "add":
                 return self._sum(s)
             case "mul":
@@ -154,11 +178,11 @@ class Text:
             case "pos":
                 (x,) = node.operands
                 inner = self._operand(x if x.sign > 0 else -x)
-                text = f"np.maximum({inner}, 0.0)" if x.sign > 0 else f"np.minimum({inner}, 0.0)"
+                text = self._clipped(inner, "maximum" if x.sign > 0 else "minimum")
                 return text if (s.sign > 0) == (x.sign > 0) else "-" + text
             case "inv":
-                return ("-" if s.sign < 0 else "") + f"1/{self._factor(node.operands[0])}"
-        return ("-" if s.sign < 0 else "") + f"{CALLS[node.op]}({self._operand(node.operands[0])})"
+                return ("-" if s.sign < 0 else "") + f"{self.one}/{self._factor(node.operands[0])}"
+        return ("-" if s.sign < 0 else "") + f"{self.calls[node.op]}({self._operand(node.operands[0])})"
 
     def _sum(self, s: Scalar) -> str:
         terms = self._terms(s)
@@ -180,7 +204,7 @@ class Text:
         sign, factors = s.sign, []
         a, b = s.node.operands
         if a.node is b.node:
-            square = f"{self._factor(Scalar(None, a.node, self._name_sign(a.node)))}**2"  # type: ignore[arg-type]
+            square = self._square(self._factor(Scalar(None, a.node, self._name_sign(a.node))))  # type: ignore[arg-type]
             return ("-" if sign < 0 else "") + square
         for x in sorted((a, b), key=lambda x: not x.node.fixed):
             name_sign = self._name_sign(x.node) if x.node.index in self.called else 1

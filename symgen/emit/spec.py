@@ -27,6 +27,7 @@ from symgen.regroup.regrouping import Regrouping
 
 WIDTH = 120
 STATES = {"q": "q", "qd": "QP", "qdd": "QDP"}
+Headings = list[tuple[int, str]]  # (index of the first node, title)
 LOCALS = ("D", "GAM", "A", "T", "X", "G", "R", "B", "np", "q", "qd", "qdd", "S", "out", "N")
 
 
@@ -178,33 +179,48 @@ def inverse_dynamics(regrouping: Regrouping, only: Callable[[str], bool] = lambd
     return _torques(regrouping, only=only)
 
 
-def _torques(
+def torque_graph(
     regrouping: Regrouping, *, acceleration: bool = True, velocity: bool = True, only: Callable[[str], bool] = lambda own: True
-) -> Function:
+) -> tuple[list[Scalar | int], Headings]:
+    """Gamma of the actuated joints, and the headings of its steps."""
     robot = regrouping.robot
     algebra = GraphAlgebra(robot)
     base = _Base(regrouping, algebra, only)
     motion = Motion(Geometry(robot, algebra, close(robot)), acceleration=acceleration, velocity=velocity)
     torque = base.torques(motion, friction=velocity)
-    outputs = [torque[j] for j in robot.joints]
-    text = Text(outputs, algebra.sections, (*LOCALS, *robot.constants))
+    return [torque[j] for j in robot.joints], algebra.sections
+
+
+def _torques(
+    regrouping: Regrouping, *, acceleration: bool = True, velocity: bool = True, only: Callable[[str], bool] = lambda own: True
+) -> Function:
+    robot = regrouping.robot
+    outputs, headings = torque_graph(regrouping, acceleration=acceleration, velocity=velocity, only=only)
+    text = Text(outputs, headings, (*LOCALS, *robot.constants))
     results = [Section("Torques", tuple(f"GAM[{row}] = {text.expression(value)}" for row, value in enumerate(outputs)))]
     return _function(robot, text, results, regrouping.names)
 
 
-def _inertia_matrix(regrouping: Regrouping) -> Function:
+def inertia_graph(regrouping: Regrouping) -> tuple[dict[tuple[int, int], Scalar | int], Headings]:
+    """The lower triangle of A by (row, column), and the headings of its steps."""
     robot = regrouping.robot
     algebra = GraphAlgebra(robot)
     base, geometry = _Base(regrouping, algebra), Geometry(robot, algebra, close(robot))
     entries: dict[tuple[int, int], Scalar | int] = {}
+    rows = {j: row for row, j in enumerate(robot.joints)}
     for i in robot.joints:
         torque = base.torques(Motion(geometry, unit=i))
-        entries |= {(j, i): torque[j] for j in robot.joints if j >= i}
-    text = Text(list(entries.values()), algebra.sections, (*LOCALS, *robot.constants))
-    rows = {j: row for row, j in enumerate(robot.joints)}
+        entries |= {(rows[j], rows[i]): torque[j] for j in robot.joints if j >= i}
+    return entries, algebra.sections
+
+
+def _inertia_matrix(regrouping: Regrouping) -> Function:
+    robot = regrouping.robot
+    entries, headings = inertia_graph(regrouping)
+    text = Text(list(entries.values()), headings, (*LOCALS, *robot.constants))
     lines = []
     for (j, i), value in entries.items():
-        targets = f"A[{rows[j]}, {rows[i]}]" + (f" = A[{rows[i]}, {rows[j]}]" if i != j else "")
+        targets = f"A[{j}, {i}]" + (f" = A[{i}, {j}]" if i != j else "")
         lines.append(f"{targets} = {text.expression(value)}")
     return _function(robot, text, [Section("Inertia matrix", tuple(lines))], regrouping.names)
 
