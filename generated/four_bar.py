@@ -235,21 +235,21 @@ def _closed(q, qd, qdd, *constants):
     qd = np.zeros_like(q) if qd is None else np.atleast_2d(np.asarray(qd, dtype=float))
     qdd = np.zeros_like(q) if qdd is None else np.atleast_2d(np.asarray(qdd, dtype=float))
     q = np.concatenate([q, _assembled(q, *constants)], axis=1)
-    J = _fill(_closure_block, np.empty((3, 5, N)), (q,), *constants)[:, 1:].transpose(2, 0, 1)
-    J_a, J_u = J[..., :1], J[..., 1:]
-    volume = np.linalg.det(J_u) / np.prod(np.linalg.norm(J, axis=2), axis=1)
+    J = _fill(_closure_block, np.empty((3, 5, N)), (q,), *constants)[:, 1:]
+    J_a, J_u = J[:, :1], J[:, 1:]
+    volume = _determinant(J_u) / np.prod(np.sqrt((J**2).sum(axis=1)), axis=0)
     if (np.abs(volume) < 1e-6).any():  # a dead point is found to half the digits of the closure
         t = int(np.abs(volume).argmin())
         raise ValueError(f"singular configuration at sample {t}: q = {q[t, :1]}, tied joints {q[t, 1:]} move freely there")
-    G = -np.linalg.solve(J_u, J_a)
-    qd = np.concatenate([qd, np.einsum("tui,ti->tu", G, qd)], axis=1)
-    B = _fill(_curvature_block, np.empty((4, N)), (q, qd), *constants).T
-    other = (volume * _MODE < 0) | (B[:, 3:] < 0).any(axis=1)  # beyond a dead point, or frames opposite (trace -1, not 3)
+    G = -_solved(J_u, J_a)
+    qd = np.concatenate([qd, np.einsum("uit,ti->tu", G, qd)], axis=1)
+    B = _fill(_curvature_block, np.empty((4, N)), (q, qd), *constants)
+    other = (volume * _MODE < 0) | (B[3:] < 0).any(axis=0)  # beyond a dead point, or frames opposite (trace -1, not 3)
     if other.any():
         t = int(other.argmax())
         raise ValueError(f"the mechanism does not close in the assembly mode of _START at sample {t}: q = {q[t, :1]}")
-    qdd = np.concatenate([qdd, np.einsum("tui,ti->tu", G, qdd) - np.linalg.solve(J_u, B[:, :3, None])[..., 0]], axis=1)
-    return q, qd, qdd, G.reshape(N, 3)
+    qdd = np.concatenate([qdd, np.einsum("uit,ti->tu", G, qdd) - _solved(J_u, B[:3]).T], axis=1)
+    return q, qd, qdd, G.reshape(3, N).T
 
 
 def _assembled(q, *constants):
@@ -285,9 +285,24 @@ def _newton(q, x, passes, *constants):
         residual = np.abs(R[:, 0]).max(axis=0)
         if k == passes or not residual.max(initial=0.0) > 1e-13:
             return x, residual
-        J = R[:, 2:].transpose(2, 0, 1)
-        J = J + 1e-14 * np.eye(3)  # a singular sample ends as one that does not close
-        x = x - np.clip(np.linalg.solve(J, R[:, 0].T[..., None])[..., 0], -0.5, 0.5)
+        step = _solved(R[:, 2:] + 1e-14 * np.eye(3)[..., None], R[:, 0])  # a singular sample ends as one that does not close
+        x = x - np.clip(step, -0.5, 0.5).T
+
+
+def _determinant(J):
+    """det J for every sample, J (3, 3, N)."""
+    return (J[0] * _cross(J[1], J[2])).sum(axis=0)
+
+
+def _solved(J, b):
+    """J**-1 b for every sample, J (3, 3, N), b (3, ..., N), by Cramer's rule."""
+    columns = _cross(J[1], J[2]), _cross(J[2], J[0]), _cross(J[0], J[1])  # of the inverse times the determinant
+    return np.stack([columns[0][k]*b[0] + columns[1][k]*b[1] + columns[2][k]*b[2] for k in range(3)]) / _determinant(J)
+
+
+def _cross(u, v):
+    """u x v for every sample."""
+    return np.stack([u[1]*v[2] - u[2]*v[1], u[2]*v[0] - u[0]*v[2], u[0]*v[1] - u[1]*v[0]])
 
 
 def _regressor_block(q, qd, qdd, G, D, L0, L1, L2, L3, g):
