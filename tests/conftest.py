@@ -49,3 +49,11 @@ def tx40_data():
     """Paths of the TX40 files by name; `fetch` finds them too."""
     with pytest.MonkeyPatch.context() as patch:
         yield _provide("tx40", patch)
+
+
+def pytest_terminal_summary(terminalreporter):
+    """What the random robots are made of: a mix that changes should be seen."""
+    from oracles.random_robots import describe_mix, random_robot
+
+    shares = {name: share for name, share in describe_mix(random_robot(seed) for seed in range(250)).items() if name != "robots"}
+    terminalreporter.write_line("250 random robots: " + ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items()))

@@ -78,12 +78,15 @@ def test_a_mutated_recursion_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not certify(regrouping).valid
 
 
-def test_random_robots_exactly_and_numerically(capsys: pytest.CaptureFixture[str]) -> None:
+def test_random_robots_are_a_mix() -> None:
+    """The shares printed at the end of the run (tests/conftest.py)."""
+    mix = describe_mix(random_robot(seed) for seed in RANDOM)
+    assert mix["oblique axes"] >= 0.3 and mix["prismatic"] >= 0.3 and mix["zero or in-plane gravity"] >= 0.2
+
+
+def test_random_robots_exactly_and_numerically() -> None:
     """250 robots: exact rank = SVD rank of the CasADi regressor; coefficients = its least-squares fit to 1e-10."""
-    robots = [random_robot(seed) for seed in RANDOM]
-    with capsys.disabled():
-        print("\nrandom robots:", describe_mix(robots))
-    for robot in robots:
+    for robot in (random_robot(seed) for seed in RANDOM):
         regrouping = regroup(robot)
         certificate = certify(regrouping)
         assert certificate.valid, (robot.name, certificate.failures)
