@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ import typer
 from symgen.cli.session import NEGATIVE, fail, reported_errors
 from symgen.cli.writing import write_all
 
-TARGETS = ("numpy",)
+TARGETS = ("numpy", "c")
 
 
 def generate(
@@ -19,14 +20,15 @@ def generate(
         list[str], typer.Argument(metavar="ROBOT...", help="Packaged robots or robot files (.yaml); `all` for every packaged one.")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the modules.")] = Path("generated"),
-    target: Annotated[str, typer.Option(help="What to emit: numpy.")] = "numpy",
+    target: Annotated[str, typer.Option(help="What to emit: numpy, c, or both as numpy,c.")] = "numpy",
     check: Annotated[bool, typer.Option("--check", help="Write nothing; fail with a diff where a module is not current.")] = False,
 ) -> None:
-    """Derive the models of each ROBOT and write them as OUTPUT/<name>.py. All are written, or none."""
+    """Derive the models of each ROBOT and write them as OUTPUT/<name>.py, or .c for C. All are written, or none."""
     with reported_errors():
-        if target not in TARGETS:
-            fail(f"target {target!r}; there is {', '.join(TARGETS)}")
-        modules = emitted(robots)
+        targets = tuple(dict.fromkeys(part.strip() for part in target.split(",")))
+        if unknown := [part for part in targets if part not in TARGETS]:
+            fail(f"target {', '.join(map(repr, unknown))}; there is {', '.join(TARGETS)}")
+        modules = emitted(robots, targets)
         if check:
             report_differences(output, modules)
             return
@@ -34,18 +36,21 @@ def generate(
             typer.echo(f"{path}")
 
 
-def emitted(robots: list[str]) -> dict[str, str]:
-    """{file name: text} of every robot. Raises SymgenError before anything is written."""
+def emitted(robots: list[str], targets: Sequence[str] = ("numpy",)) -> dict[str, str]:
+    """{file name: text} of every robot and target. Raises SymgenError before anything is written."""
     from symgen.description import load_robot, packaged_robots
-    from symgen.emit import generate_module
+    from symgen.emit import generate_files
 
     modules: dict[str, str] = {}
     for source in packaged_robots() if robots == ["all"] else robots:
         robot = load_robot(source)
-        name = f"{robot.name}.py"
-        if name in modules:
+        command = Path(source).name if source.endswith((".yaml", ".yml")) else source
+        files = generate_files(robot, targets=targets, command=command)
+        if modules.keys() & files.keys():
             fail(f"two robots are called {robot.name}; their modules would overwrite each other")
-        modules[name] = generate_module(robot, command=Path(source).name if source.endswith((".yaml", ".yml")) else source)
+        if "c" in targets and f"{robot.name}.c" not in files:
+            typer.echo(f"{robot.name}: no C, its loops are closed by iteration; the NumPy module serves", err=True)
+        modules |= files
     return modules
 
 

@@ -1,13 +1,29 @@
 """Emission: from base parameters to the text of a module."""
 
+from collections.abc import Sequence
+
 from symgen.description.robot import Robot
-from symgen.emit.render import render
+from symgen.emit.c_target import has_c_target
+from symgen.emit.render import render, render_c
 from symgen.emit.spec import module_spec
 from symgen.regroup.regrouping import regroup
 
-__all__ = ["generate_module"]
+__all__ = ["TARGETS", "generate_files", "generate_module"]
+
+TARGETS = ("numpy", "c")
 
 
 def generate_module(robot: Robot, *, command: str | None = None) -> str:
     """Text of the NumPy module of `robot`: derive, regroup, lay out."""
     return render(module_spec(regroup(robot)), command=command)
+
+
+def generate_files(robot: Robot, *, targets: Sequence[str] = ("numpy",), command: str | None = None) -> dict[str, str]:
+    """{file name: text} of every target; C is left out where the joints are tied by closure equations alone."""
+    spec, files = module_spec(regroup(robot)), {}
+    for target in targets:
+        if target == "numpy":
+            files[f"{robot.name}.py"] = render(spec, command=command)
+        elif target == "c" and has_c_target(robot):
+            files[f"{robot.name}.c"] = render_c(spec, command=command)
+    return files

@@ -181,7 +181,7 @@ class Text:
                 text = self._clipped(inner, "maximum" if x.sign > 0 else "minimum")
                 return text if (s.sign > 0) == (x.sign > 0) else "-" + text
             case "inv":
-                return ("-" if s.sign < 0 else "") + f"{self.one}/{self._factor(node.operands[0])}"
+                return ("-" if s.sign < 0 else "") + f"{self.one}/{self._divisor(node.operands[0])}"
         return ("-" if s.sign < 0 else "") + f"{self.calls[node.op]}({self._operand(node.operands[0])})"
 
     def _sum(self, s: Scalar) -> str:
@@ -215,6 +215,10 @@ class Text:
     def _factor(self, s: Scalar) -> str:
         text = self._operand(s)
         return f"({text})" if (s.node.index not in self.called and s.node.op in (ADD, INV)) or text.startswith("-") else text
+
+    def _divisor(self, s: Scalar) -> str:
+        text = self._factor(s)
+        return f"({text})" if "*" in text and not text.startswith("(") else text
 
 
 def number(c: Fraction) -> str:

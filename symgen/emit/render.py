@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from symgen.derive.loop_equations import loop_system
 from symgen.derive.loops import close
 from symgen.description.robot import FIXED, Robot
+from symgen.emit.c_target import ABI, c_spec, layout
 from symgen.emit.header import header, literal, packed, tables
 from symgen.emit.printers import Section
 from symgen.emit.spec import WIDTH, ModuleSpec
@@ -87,6 +88,33 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         "blocks": [_block(name, spec, sizes, constants) for name in (*SUMMARIES, *(LOOP_SUMMARIES if general else ()))],
     }
     return _environment().get_template("module.py.jinja").render(context)
+
+
+def render_c(spec: ModuleSpec, *, command: str | None = None) -> str:
+    """The C file of `spec`. Same robot file, same version: same bytes."""
+    robot, c = spec.robot, c_spec(spec)
+    lines = [line for kernel in c.kernels for section in (*kernel.sections, Section("", kernel.before)) for line in section.lines]
+    context = {
+        "title": _comment(robot.title or robot.name),
+        "file": _comment(robot.file or robot.name),
+        "sha256": robot.sha256,
+        "version": VERSION,
+        "command": _comment(command or robot.file or robot.name),
+        "header": [_comment(line) for line in c.header],
+        "name": robot.name,
+        "abi": ABI,
+        "n": c.joints,
+        "tile": c.tile,
+        "kernels": layout(c),
+        "helpers": {name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")},
+    }
+    return _environment().get_template("kernels.c.jinja").render(context)
+
+
+def _comment(text: str) -> str:
+    """Text that cannot end a C comment, start another or continue a line."""
+    shown = "".join(c if c.isprintable() else " " for c in plain(text))
+    return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", shown)
 
 
 def plain(text: str) -> str:

@@ -1,0 +1,294 @@
+"""The C file of a model, compiled on first use and called like the NumPy module; without a compiler the NumPy module serves.
+
+    model = compiled_model(load_model("tx40"))          # generated/tx40.c beside generated/tx40.py
+
+The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder (`SYMGEN_CACHE`, else that of the platform). Its name
+holds the SHA-256 of source, flags, compiler and processor, and that of its own bytes, so that a damaged file is seen before it is loaded; it is
+written under another name and moved, so that processes may compile at once. One tile of every function is compared with NumPy.
+
+A C file runs as it is, unlike a module (`runtime.model_source`): compile only what you emitted yourself.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Protocol, cast
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.model import GeneratedModel
+
+Array = np.ndarray
+
+ABI = 1
+FLAGS = ("-std=c11", "-O2", "-ftree-vectorize", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-shared", "-fPIC")
+LIBRARIES = ("-lm",)
+UNSAFE = ("-ffast-math", "-Ofast", "-funsafe-math-optimizations")  # set flush-to-zero in the process that loads the object
+TIME = 120.0  # s, of one compilation
+TOLERANCE = 1e-10  # of the largest entry: the self-check looks for wrong code, not for rounding
+STATES = {
+    "regressor": ("q", "qd", "qdd"),
+    "inverse_dynamics": ("q", "qd", "qdd"),
+    "inertia_matrix": ("q",),
+    "bias": ("q", "qd"),
+    "gravity": ("q",),
+}
+
+
+class FallbackWarning(UserWarning):
+    """The NumPy module is used in place of C; the message says why."""
+
+
+class _NotCompiledError(Exception):
+    """Why there is no C."""
+
+
+class DynamicModel(GeneratedModel, Protocol):
+    """A generated model with the dynamics that C replaces."""
+
+    inverse_dynamics: Callable[..., Array]
+    inertia_matrix: Callable[..., Array]
+    bias: Callable[..., Array]
+    gravity: Callable[..., Array]
+
+
+def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None) -> GeneratedModel:
+    """`model` with its functions in C, or `model` itself, with a FallbackWarning saying why, where that cannot be had.
+
+    source : the C file; default: beside the file of the model, .c for .py.   cache : folder of the compiled objects.
+    """
+    try:
+        path = source or _beside(model)
+        library = _loaded(path, _text(path), cache or cache_folder(), model)
+        compiled = CompiledModel(cast(DynamicModel, model), library)
+        compiled.check()
+        return cast(GeneratedModel, compiled)
+    except (_NotCompiledError, OSError) as e:
+        warnings.warn(f"{model.NAME}: NumPy in place of C: {e}", FallbackWarning, stacklevel=2)
+        return model
+
+
+def cache_folder() -> Path:
+    """SYMGEN_CACHE, or the folder of the platform for files that can be made again."""
+    if given := os.environ.get("SYMGEN_CACHE"):
+        return Path(given)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "symgen" / "compiled"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "symgen" / "compiled"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symgen" / "compiled"
+
+
+class CompiledModel:
+    """The API of the generated module; what the C file lacks is that of the module."""
+
+    def __init__(self, model: DynamicModel, library: ctypes.CDLL) -> None:
+        self._model, self._library = model, library
+        self._n, self._b = len(model.JOINTS), len(model.BASE_PARAMETERS)
+        self._third = _third_of_last_cache()
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "_model":  # while it is being copied
+            raise AttributeError(name)
+        return getattr(self._model, name)
+
+    def regressor(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+        """D, shape (N, n, b): a view on one store of shape (b, n, N)."""
+        D = self._filled_store(q, qd, qdd, out, constants).transpose(2, 1, 0)
+        return cast(Array, D[0]) if np.ndim(q) == 1 else D
+
+    def observation_matrix(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+        """W, shape (n*N, b), rows joint-major, Fortran order: the same store, no copy."""
+        return self._filled_store(q, qd, qdd, out, constants).reshape(self._b, -1).T
+
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, X: Array, **constants: float) -> Array:
+        """Gamma, shape (N, n)."""
+        return self._dynamics("inverse_dynamics", (q, qd, qdd), X, constants, 1)
+
+    def inertia_matrix(self, q: Array, X: Array, **constants: float) -> Array:
+        """A(q), shape (N, n, n)."""
+        return self._dynamics("inertia_matrix", (q,), X, constants, 2)
+
+    def bias(self, q: Array, qd: Array, X: Array, **constants: float) -> Array:
+        """Gamma at qdd = 0, shape (N, n)."""
+        return self._dynamics("bias", (q, qd), X, constants, 1)
+
+    def gravity(self, q: Array, X: Array, **constants: float) -> Array:
+        """Gamma at rest without friction, shape (N, n)."""
+        return self._dynamics("gravity", (q,), X, constants, 1)
+
+    def forward_dynamics(self, q: Array, qd: Array, tau: Array, X: Array, **constants: float) -> Array:
+        """qdd = A(q)**-1 (tau - bias), shape (N, n)."""
+        A, H = self.inertia_matrix(q, X, **constants), self.bias(q, qd, X, **constants)
+        return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+    def check(self) -> None:
+        """Raise unless every function agrees with NumPy on a tile and some samples more."""
+        rng = np.random.default_rng(11)
+        states = rng.uniform(-2, 2, (3, 71, self._n))
+        X = rng.uniform(-1, 1, self._b)
+        for name, used in STATES.items():
+            arguments = [*states[: len(used)], *([] if name == "regressor" else [X])]
+            found, expected = (getattr(m, name)(*arguments) for m in (self, self._model))
+            if not np.abs(found - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
+                raise _NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
+
+    def _filled_store(self, q: Array, qd: Array, qdd: Array, out: Array | None, constants: Mapping[str, float]) -> Array:
+        states = self._states("regressor", (q, qd, qdd))
+        N = len(states[0])
+        if out is None:
+            out = self._model.store(N)
+        elif not (isinstance(out, cast(Any, self._model).Store) and cast(Any, out).ready and out.shape == (self._b, self._n, N)):
+            raise ValueError(
+                f"out: expected store({N}) of shape {(self._b, self._n, N)}, found {type(out).__name__} of shape {np.shape(out)}"
+            )
+        self._call("regressor", states, constants, out)
+        return out.view(np.ndarray)
+
+    def _dynamics(self, name: str, given: Sequence[Array], X: Array, constants: Mapping[str, float], axes: int) -> Array:
+        states = self._states(name, given)
+        X = np.ascontiguousarray(X, dtype=float)
+        if X.shape != (self._b,):
+            raise InputError(f"{self._model.NAME}: X has shape {X.shape}; expected ({self._b},)")
+        result = np.empty((*[self._n] * axes, len(states[0])))
+        self._call(name, (*states, X), constants, result)
+        result = np.moveaxis(result, -1, 0)
+        return cast(Array, result[0]) if np.ndim(given[0]) == 1 else result
+
+    def _states(self, name: str, given: Sequence[Array]) -> tuple[Array, ...]:
+        """Contiguous (N, n) arrays of one shape: C reads past the end of any other."""
+        states = tuple(np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in given)
+        for label, x in zip(STATES[name], states, strict=True):
+            if x.ndim != 2 or x.shape[1] != self._n or x.shape != states[0].shape:
+                raise InputError(
+                    f"{self._model.NAME}: {label} has shape {x.shape}, q {states[0].shape}; expected (N, {self._n}), the same for all"
+                )
+        return states
+
+    def _call(self, name: str, inputs: Sequence[Array], constants: Mapping[str, float], result: Array) -> None:
+        unknown = set(constants) - set(self._model.CONSTANTS)
+        if unknown:
+            raise TypeError(
+                f"{name}() got unexpected keywords {sorted(unknown)}; constants are {', '.join(self._model.CONSTANTS) or 'none'}"
+            )
+        values = np.array([float({**self._model.CONSTANTS, **constants}[c]) for c in self._model.CONSTANTS] or [0.0])
+        if not (result.flags.c_contiguous and result.flags.aligned and result.flags.writeable and result.dtype == np.float64):
+            raise InputError(f"{self._model.NAME}: the store is not a writeable float64 array in C order")
+        stream = result.nbytes > self._third
+        pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*inputs, values, result)]
+        status = getattr(self._library, f"{self._model.NAME}_{name}")(ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream))
+        if status:
+            raise InputError(f"{self._model.NAME}: {name} in C refused its arguments with {status}")
+
+
+def _third_of_last_cache() -> int:
+    """Bytes beyond which a result should not pass through the caches."""
+    try:
+        size = os.sysconf("SC_LEVEL3_CACHE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        size = 0
+    return (size if size > 0 else 32 << 20) // 3
+
+
+def _beside(model: GeneratedModel) -> Path:
+    file = getattr(model, "__file__", None)
+    if file is None:
+        raise _NotCompiledError("the model was not loaded from a file, and no C file is given")
+    return Path(file).with_suffix(".c")
+
+
+def _text(path: Path) -> bytes:
+    if not path.is_file():
+        raise _NotCompiledError(
+            f"there is no {path}; `symgen generate {path.stem} --target numpy,c` writes it, except where loops need iteration"
+        )
+    return path.read_bytes()
+
+
+def _loaded(path: Path, text: bytes, folder: Path, model: GeneratedModel) -> ctypes.CDLL:
+    """The shared object of a C file, from the cache or compiled; one that does not load is compiled again, once."""
+    command, version = compiler()
+    parts = (text, " ".join((*FLAGS, *LIBRARIES)).encode(), " ".join(command).encode(), version.encode(), _processor().encode())
+    key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if os.name == "posix" and folder.stat().st_mode & 0o002:
+        raise _NotCompiledError(f"anyone may write to the cache folder {folder}; choose another by SYMGEN_CACHE")
+    for found in sorted(folder.glob(f"{key[:32]}-*.so")):
+        if hashlib.sha256(found.read_bytes()).hexdigest()[:32] == found.stem.partition("-")[2]:
+            try:
+                return _opened(found, model)
+            except (_NotCompiledError, OSError):
+                pass
+        found.unlink(missing_ok=True)
+    return _opened(_compiled(command, path, text, folder, key[:32]), model)
+
+
+def _compiled(command: Sequence[str], path: Path, text: bytes, folder: Path, key: str) -> Path:
+    with TemporaryDirectory(dir=folder, prefix=".compiling-") as scratch:
+        source, target = Path(scratch) / path.name, Path(scratch) / f"{path.stem}.so"
+        source.write_bytes(text)
+        line = [*command, *FLAGS, source.name, "-o", target.name, *LIBRARIES]
+        try:
+            done = subprocess.run(line, cwd=scratch, capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
+        except (OSError, subprocess.TimeoutExpired) as e:
+            raise _NotCompiledError(f"{' '.join(command)} did not run: {e}") from e
+        if done.returncode or not target.is_file():
+            first = next(iter(done.stderr.strip().splitlines()), "no message")
+            raise _NotCompiledError(f"{' '.join(command)} failed with {done.returncode}: {first}")
+        final = folder / f"{key}-{hashlib.sha256(target.read_bytes()).hexdigest()[:32]}.so"
+        target.replace(final)
+    return final
+
+
+def _opened(path: Path, model: GeneratedModel) -> ctypes.CDLL:
+    """The object, if it speaks this ABI and stems from the robot file of the model."""
+    library = ctypes.CDLL(str(path))
+    try:
+        abi, sha256 = getattr(library, f"{model.NAME}_abi"), getattr(library, f"{model.NAME}_source_sha256")
+        for name in STATES:
+            getattr(library, f"{model.NAME}_{name}").restype = ctypes.c_int32
+    except AttributeError as e:
+        raise _NotCompiledError(f"the C file is not that of {model.NAME}: {e}") from e
+    sha256.restype, abi.restype = ctypes.c_char_p, ctypes.c_int32
+    if abi() != ABI:
+        raise _NotCompiledError(f"the C file has interface {abi()}, expected {ABI}; emit it again")
+    if sha256().decode() != model.SOURCE_SHA256:
+        raise _NotCompiledError("C file and module stem from different robot files; emit both again")
+    return library
+
+
+def compiler() -> tuple[tuple[str, ...], str]:
+    """Command of the C compiler and what it says of its version; raises where there is none."""
+    given = shlex.split(os.environ.get("CC", ""))
+    program = shutil.which(given[0]) if given else next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    if program is None:
+        raise _NotCompiledError(f"no C compiler {given[0]} (CC)" if given else "no C compiler cc, gcc or clang on PATH")
+    unsafe = [flag for flag in given[1:] if flag in UNSAFE]
+    if unsafe:
+        raise _NotCompiledError(f"CC holds {', '.join(unsafe)}, which changes the arithmetic of the whole process")
+    command = (program, *given[1:])
+    try:
+        done = subprocess.run([*command, "--version"], capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
+    except (OSError, subprocess.TimeoutExpired) as e:
+        raise _NotCompiledError(f"{program} did not run: {e}") from e
+    return command, done.stdout
+
+
+def _processor() -> str:
+    """What the code may depend on: machine, system, processor flags."""
+    info = Path("/proc/cpuinfo")
+    text = info.read_text(errors="replace") if info.is_file() else platform.processor()
+    flags = next((line for line in text.splitlines() if line.startswith(("flags", "Features"))), "")
+    return f"{platform.system()} {platform.machine()} {platform.architecture()[0]} {flags}"

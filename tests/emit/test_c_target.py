@@ -1,0 +1,202 @@
+"""The C file: agreement with NumPy on every packaged robot, no warnings, clean under sanitizers, deterministic, closed to hostile texts."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from symgen.cli.generate import emitted
+from symgen.description import load_robot, packaged_robots, parse_robot
+from symgen.emit import generate_files
+from symgen.emit.c_target import has_c_target
+
+FLAGS = ["-std=c11", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
+FAST = [*FLAGS, "-O2", "-ftree-vectorize", "-shared", "-fPIC"]
+COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
+GENERAL_LOOPS = {"four_bar", "five_bar"}  # closed by Newton iteration: NumPy only
+FUNCTIONS = {
+    "regressor": ("q", "qd", "qdd"),
+    "inverse_dynamics": ("q", "qd", "qdd"),
+    "inertia_matrix": ("q",),
+    "bias": ("q", "qd"),
+    "gravity": ("q",),
+}
+needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+
+
+@cache
+def files(name: str) -> dict[str, str]:
+    return generate_files(load_robot(name), targets=("numpy", "c"), command=name)
+
+
+def numpy_module(name: str, text: str) -> ModuleType:
+    module = ModuleType(name)
+    exec(compile(text, name, "exec"), module.__dict__)  # noqa: S102 (our own output)
+    return module
+
+
+def compiled(folder: Path, text: str, compiler: str, flags: list[str]) -> Path:
+    (folder / "robot.c").write_text(text, encoding="utf-8")
+    done = subprocess.run([compiler, *flags, "robot.c", "-o", "robot.so", "-lm"], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    return folder / "robot.so"
+
+
+def call(
+    library: ctypes.CDLL, module: ModuleType, name: str, states: np.ndarray, X: np.ndarray, shape: tuple[int, ...], flags: int
+) -> np.ndarray:
+    """The result of one C function, in an array that held NaN or, for the regressor, the store of the module."""
+    N, used = states.shape[1], FUNCTIONS[name]
+    S = module.store(N).view(np.ndarray) if name == "regressor" else np.full((*shape, N), np.nan)
+    constants = np.array([*module.CONSTANTS.values(), 0.0])
+    arrays = [*(np.ascontiguousarray(x) for x in states[: len(used)]), *([] if name == "regressor" else [X]), constants, S]
+    pointers = [ctypes.c_void_p(x.ctypes.data) for x in arrays]
+    assert getattr(library, f"{module.NAME}_{name}")(ctypes.c_int64(N), *pointers, ctypes.c_int32(flags)) == 0
+    return np.moveaxis(S.transpose(1, 0, 2) if name == "regressor" else S, -1, 0)
+
+
+def compare(library: ctypes.CDLL, module: ModuleType, samples: tuple[int, ...]) -> None:
+    n, b = len(module.JOINTS), len(module.BASE_PARAMETERS)
+    shapes = {"regressor": (n, b), "inertia_matrix": (n, n)}
+    X = np.random.default_rng(5).standard_normal(b)
+    for N in samples:
+        states = np.random.default_rng(N).uniform(-3, 3, (3, N, n))
+        for name, used in FUNCTIONS.items():
+            arguments = [*states[: len(used)], *([] if name == "regressor" else [X])]
+            expected = getattr(module, name)(*arguments)
+            for flags in (0, 1):
+                found = call(library, module, name, states, X, shapes.get(name, (n,)), flags)
+                assert found.shape == expected.shape
+                if N:
+                    scale = np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)  # each column's maximum
+                    assert (np.abs(found - expected) <= 1e-12 * scale).all(), (name, N, flags)
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", [n for n in packaged_robots() if n not in GENERAL_LOOPS])
+def test_agrees_with_numpy(name: str, tmp_path: Path) -> None:
+    """To 1e-12 of each column's maximum: the sums are the same, sines and cosines may differ by some units in the last place."""
+    library = ctypes.CDLL(str(compiled(tmp_path, files(name)[f"{name}.c"], COMPILERS[0], FAST)))
+    compare(library, numpy_module(name, files(name)[f"{name}.py"]), (0, 1, 513, 1024))
+
+
+@needs_compiler
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("name", ["panda", "sr400"])
+def test_portable_path(name: str, compiler: str, tmp_path: Path) -> None:
+    library = ctypes.CDLL(str(compiled(tmp_path, files(name)[f"{name}.c"], compiler, [*FAST, "-DPORTABLE"])))
+    compare(library, numpy_module(name, files(name)[f"{name}.py"]), (1, 131))
+
+
+def test_general_loops_have_none() -> None:
+    assert all(not has_c_target(load_robot(name)) for name in GENERAL_LOOPS)
+    assert emitted(["four_bar"], ("c",)) == {}
+
+
+MAIN = """
+#include <stdint.h>
+#include <stdlib.h>
+int32_t {name}_regressor(int64_t, const double *, const double *, const double *, const double *, double *, int32_t);
+int32_t {name}_inertia_matrix(int64_t, const double *, const double *, const double *, double *, int32_t);
+int main(void)
+{{
+    const double constants[] = {{{constants}}};
+    for (int64_t N = 0; N < 200; N += 33)
+        for (int32_t flags = 0; flags < 2; flags++) {{
+            double *q = calloc((size_t)(N*{n} + 1), sizeof *q), *X = calloc({b}, sizeof *X);
+            double *S = calloc((size_t)(N*{b}*{n} + 1), sizeof *S), *A = calloc((size_t)(N*{n}*{n} + 1), sizeof *A);
+            if ({name}_regressor(N, q, q, q, constants, S, flags) || {name}_inertia_matrix(N, q, X, constants, A, flags))
+                return 1;
+            if ({name}_regressor(-1, q, q, q, constants, S, flags) != 1 || {name}_regressor(N, q, q, NULL, constants, S, flags) != 1)
+                return 2;
+            free(q), free(X), free(S), free(A);
+        }}
+    return 0;
+}}
+"""
+
+
+@needs_compiler
+@pytest.mark.parametrize("path", [[], ["-DPORTABLE"]], ids=["wide", "portable"])
+def test_sanitizers(path: list[str], tmp_path: Path) -> None:
+    module = numpy_module("scara", files("scara")["scara.py"])
+    sizes = {"name": "scara", "n": len(module.JOINTS), "b": len(module.BASE_PARAMETERS)}
+    main = MAIN.format(**sizes, constants=", ".join(map(repr, [*module.CONSTANTS.values(), 0.0])))
+    (tmp_path / "main.c").write_text(main)
+    (tmp_path / "robot.c").write_text(files("scara")["scara.c"], encoding="utf-8")
+    sanitize = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    flags = [*FLAGS, "-O1", *path, *sanitize, "main.c", "robot.c", "-o", "main", "-lm"]
+    done = subprocess.run([COMPILERS[0], *flags], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+
+
+def test_same_bytes_whatever_the_hash_seed() -> None:
+    code = "import hashlib\nfrom symgen.cli.generate import emitted\nprint(hashlib.sha256(emitted(['tx40'], ('c',))['tx40.c'].encode()).hexdigest())"
+    seen = {
+        subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env={**os.environ, "PYTHONHASHSEED": seed}).stdout
+        for seed in ("1", "77")
+    }
+    assert len(seen) == 1
+
+
+def test_quantities_have_the_names_of_the_numpy_module() -> None:
+    text = files("tx40")["tx40.c"]
+    assert "const double W12 = -S2*QP1;" in text and "/* Link 2 */" in text and "np." not in text and "**" not in text.split("*/", 1)[1]
+
+
+@needs_compiler
+@pytest.mark.parametrize("title", ["*/ int evil(void) { return 1; } /*", "a /* b */ c", "?\u202e?/ \\", "**/*/ */", "\n*/", "ends in \\"])
+def test_texts_stay_in_their_comment(title: str, tmp_path: Path) -> None:
+    """A robot refuses most such titles itself; the command may hold any file name."""
+    robot = replace(load_robot("planar_2r"), title="??/ ** /?? *")
+    text = generate_files(robot, targets=("c",), command=title)["planar_2r.c"]
+    compiled(tmp_path, text, COMPILERS[0], [*FLAGS, "-O0", "-shared", "-fPIC"])
+    comment, code = text.split("*/", 1)
+    assert "evil" not in code and comment.count("/*") == 1 and code == files("planar_2r")["planar_2r.c"].split("*/", 1)[1]
+
+
+AWKWARD = b"""
+symgen: 1
+name: awkward
+gravity: [0, 0, -m]
+constants: {m: 9.81, double: 0.3, TILE: 0.2, y0: 0.1}
+frames:
+  1: {ant: 0, sigma: 0, alpha: pi/3, d: y0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 1, alpha: 1.1, d: double/(TILE*y0), theta: 0.4, r: q2 + TILE}
+elements:
+  FA: {kind: coulomb, along: all, when: positive}
+  FB: {kind: coulomb, along: all, when: negative}
+  FC: {kind: viscous, along: all, when: negative}
+"""
+
+
+@needs_compiler
+def test_constants_with_the_names_of_c(tmp_path: Path) -> None:
+    """Keywords and macros as constants, quotients of products, motion in one direction."""
+    made = generate_files(parse_robot(AWKWARD, "awkward.yaml"), targets=("numpy", "c"))
+    library = ctypes.CDLL(str(compiled(tmp_path, made["awkward.c"], COMPILERS[0], FAST)))
+    compare(library, numpy_module("awkward", made["awkward.py"]), (65,))
+
+
+@needs_compiler
+def test_nan_and_infinity_as_in_numpy(tmp_path: Path) -> None:
+    module = numpy_module("planar_2r", files("planar_2r")["planar_2r.py"])
+    library = ctypes.CDLL(str(compiled(tmp_path, files("planar_2r")["planar_2r.c"], COMPILERS[0], FAST)))
+    states = np.ones((3, 5, 2))
+    states[1, 1, 0], states[1, 2, 1], states[2, 3, 0] = np.nan, np.inf, -np.inf
+    b = len(module.BASE_PARAMETERS)
+    with np.errstate(invalid="ignore"):
+        expected = module.regressor(*states)
+    np.testing.assert_allclose(call(library, module, "regressor", states, np.ones(b), (2, b), 0), expected, rtol=1e-12, atol=1e-12)
