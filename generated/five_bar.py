@@ -18,7 +18,8 @@ Element     FV      viscous: along q1, q3
 Element     FS      coulomb: along q1, q3
 Element     OFFSET  offset: along q1, q3
 Loop        frame 6 coincides with cut frame 5
-Loop        q2, q4, q5 from the closure equations by Newton; assembly mode of q1 = 2.2, q3 = 0.9, q2 = -1.464, q4 = 1.489, q5 = 1.653
+Loop        q5 = -q1 - q2 + q3 + q4
+Loop        q2, q4 from the closure equations by Newton; assembly mode of q1 = 2.2, q3 = 0.9, q2 = -1.464, q4 = 1.489
 
 Base parameters, 17 of 48; Gautier and Khalil (1990), recognised from 60-digit sampling
     ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4
@@ -37,9 +38,9 @@ Cost per sample
     inertia_matrix    27 multiplications, 17 additions, 2 sin, 1 cos
     bias              45 multiplications, 30 additions, 4 sin, 4 cos
     gravity           21 multiplications, 14 additions, 4 sin, 4 cos
-    frame_poses       8 multiplications, 8 additions, 5 sin, 5 cos
-    closure           14 multiplications, 13 additions, 5 sin, 5 cos
-    curvature         39 multiplications, 21 additions, 5 sin, 5 cos
+    frame_poses       8 multiplications, 7 additions, 4 sin, 4 cos
+    closure           8 multiplications, 10 additions, 4 sin, 4 cos
+    curvature         24 multiplications, 10 additions, 4 sin, 4 cos
 """
 
 import numpy as np
@@ -82,11 +83,12 @@ LIMITS = {}
 VALUES = {}
 _PATHS = {
     1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),))), 3: ((3, 0, ((1, 1.0),)),),
-    4: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))), 5: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)), (5, 0, ((4, 1.0),))),
+    4: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))),
+    5: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)), (5, 0, ((1, 1.0), (3, 1.0), (0, -1.0), (2, -1.0)))),
     6: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))),
 }
-_START = (2.2, 0.9, -1.4637535910825177, 1.4891269023374534, 1.652880493419971)
-_MODE = 1.0  # sign of det J_u in the assembly mode of _START
+_START = (2.2, 0.9, -1.4637535910825177, 1.4891269023374534)
+_MODE = -1.0  # sign of det J_u in the assembly mode of _START
 
 
 class Store(np.ndarray):
@@ -214,7 +216,7 @@ def frame_poses(q, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
 def jacobian(q, *, frame=6, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
     """J, shape (N, 6, 2): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
     T = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g).reshape(-1, 6, 4, 4)
-    J = np.zeros((len(T), 6, 5))
+    J = np.zeros((len(T), 6, 4))
     P = T[:, (6 if frame is None else frame) - 1, :3, 3]
     for j, sigma, rates in _PATHS[6 if frame is None else frame]:
         z = T[:, j - 1, :3, 2]
@@ -222,7 +224,7 @@ def jacobian(q, *, frame=6, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    G = _closed(q, None, None, L0, L1, L2, L3, L4, g)[3].reshape(-1, 3, 2)
+    G = _closed(q, None, None, L0, L1, L2, L3, L4, g)[3].reshape(-1, 2, 2)
     J = J[..., :2] + J[..., 2:] @ G
     return J[0] if np.ndim(q) == 1 else J
 
@@ -230,25 +232,25 @@ def jacobian(q, *, frame=6, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
 def passive_joints(q, qd=None, qdd=None, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
     """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also their accelerations."""
     rates = np.array([
-        [0, 0, 1, 0, 0],
-        [0, 0, 0, 1, 0],
-        [0, 0, 0, 0, 1],
+        [0, 0, 1, 0],
+        [0, 0, 0, 1],
+        [-1, 1, -1, 1],
     ], dtype=float)
     offsets = np.array([0, 0, 0], dtype=float)
-    states = [x.reshape(*np.shape(q)[:-1], 5) for x in _closed(q, qd, qdd, L0, L1, L2, L3, L4, g)[:3]]
+    states = [x.reshape(*np.shape(q)[:-1], 4) for x in _closed(q, qd, qdd, L0, L1, L2, L3, L4, g)[:3]]
     found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
     found[0] += offsets
     return found[0] if len(found) == 1 else tuple(found)
 
 
 def _closed(q, qd, qdd, *constants):
-    """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 5), and G (N, 3*2), rates of the tied ones."""
+    """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 4), and G (N, 2*2), rates of the tied ones."""
     q = np.atleast_2d(np.asarray(q, dtype=float))
     N = len(q)
     qd = np.zeros_like(q) if qd is None else np.atleast_2d(np.asarray(qd, dtype=float))
     qdd = np.zeros_like(q) if qdd is None else np.atleast_2d(np.asarray(qdd, dtype=float))
     q = np.concatenate([q, _assembled(q, *constants)], axis=1)
-    J = _fill(_closure_block, np.empty((3, 6, N)), (q,), *constants)[:, 1:]
+    J = _fill(_closure_block, np.empty((2, 5, N)), (q,), *constants)[:, 1:]
     J_a, J_u = J[:, :2], J[:, 2:]
     volume = _determinant(J_u) / np.prod(np.sqrt((J**2).sum(axis=1)), axis=0)
     if (np.abs(volume) < 1e-6).any():  # a dead point is found to half the digits of the closure
@@ -256,17 +258,17 @@ def _closed(q, qd, qdd, *constants):
         raise ValueError(f"singular configuration at sample {t}: q = {q[t, :2]}, tied joints {q[t, 2:]} move freely there")
     G = -_solved(J_u, J_a)
     qd = np.concatenate([qd, np.einsum("uit,ti->tu", G, qd)], axis=1)
-    B = _fill(_curvature_block, np.empty((4, N)), (q, qd), *constants)
-    other = (volume * _MODE < 0) | (B[3:] < 0).any(axis=0)  # beyond a dead point, or frames opposite (trace -1, not 3)
+    B = _fill(_curvature_block, np.empty((2, N)), (q, qd), *constants)
+    other = (volume * _MODE < 0) | (B[2:] < 0).any(axis=0)  # beyond a dead point, or frames opposite (trace -1, not 3)
     if other.any():
         t = int(other.argmax())
         raise ValueError(f"the mechanism does not close in the assembly mode of _START at sample {t}: q = {q[t, :2]}")
-    qdd = np.concatenate([qdd, np.einsum("uit,ti->tu", G, qdd) - _solved(J_u, B[:3]).T], axis=1)
-    return q, qd, qdd, G.reshape(6, N).T
+    qdd = np.concatenate([qdd, np.einsum("uit,ti->tu", G, qdd) - _solved(J_u, B[:2]).T], axis=1)
+    return q, qd, qdd, G.reshape(4, N).T
 
 
 def _assembled(q, *constants):
-    """Tied joints (N, 3) that close the loops, in the assembly mode of _START and continuous in q.
+    """Tied joints (N, 2) that close the loops, in the assembly mode of _START and continuous in q.
 
     Along a smooth record only knots are followed from _START; the samples between them start from interpolation.
     """
@@ -292,45 +294,31 @@ def _assembled(q, *constants):
 def _newton(q, x, passes, *constants):
     """At most `passes` Newton steps on the tied joints x; returns x and the largest residual of each sample."""
     for k in range(passes + 1):
-        R = _fill(_closure_block, np.empty((3, 6, len(q))), (np.concatenate([q, x], axis=1),), *constants)
+        R = _fill(_closure_block, np.empty((2, 5, len(q))), (np.concatenate([q, x], axis=1),), *constants)
         residual = np.abs(R[:, 0]).max(axis=0)
         if k == passes or not residual.max(initial=0.0) > 1e-13:
             return x, residual
-        step = _solved(R[:, 3:] + 1e-14 * np.eye(3)[..., None], R[:, 0])  # a singular sample ends as one that does not close
+        step = _solved(R[:, 3:] + 1e-14 * np.eye(2)[..., None], R[:, 0])  # a singular sample ends as one that does not close
         x = x - np.clip(step, -0.5, 0.5).T
 
 
 def _determinant(J):
-    """det J for every sample, J (3, 3, N)."""
-    return (J[0] * _cross(J[1], J[2])).sum(axis=0)
+    """det J for every sample, J (2, 2, N)."""
+    return J[0, 0]*J[1, 1] - J[0, 1]*J[1, 0]
 
 
 def _solved(J, b):
-    """J**-1 b for every sample, J (3, 3, N), b (3, ..., N), by Cramer's rule."""
-    columns = _cross(J[1], J[2]), _cross(J[2], J[0]), _cross(J[0], J[1])  # of the inverse times the determinant
-    return np.stack([columns[0][k]*b[0] + columns[1][k]*b[1] + columns[2][k]*b[2] for k in range(3)]) / _determinant(J)
-
-
-def _cross(u, v):
-    """u x v for every sample."""
-    return np.stack([u[1]*v[2] - u[2]*v[1], u[2]*v[0] - u[0]*v[2], u[0]*v[1] - u[1]*v[0]])
+    """J**-1 b for every sample, J (2, 2, N), b (2, ..., N), by Cramer's rule."""
+    (J11, J12), (J21, J22) = J
+    return np.stack([J22*b[0] - J12*b[1], J11*b[1] - J21*b[0]]) / _determinant(J)
 
 
 def _regressor_block(q, qd, qdd, G, D, L0, L1, L2, L3, L4, g):
-    """Fill D, shape (17, 2, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (5, N); G: (3*2, N)."""
+    """Fill D, shape (17, 2, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (4, N); G: (2*2, N)."""
     # Inputs
-    q1 = q[0]
-    q3 = q[1]
-    q2 = q[2]
-    q4 = q[3]
-    QP1 = qd[0]
-    QP3 = qd[1]
-    QP2 = qd[2]
-    QP4 = qd[3]
-    QDP1 = qdd[0]
-    QDP3 = qdd[1]
-    QDP2 = qdd[2]
-    QDP4 = qdd[3]
+    q1, q3, q2, q4 = q
+    QP1, QP3, QP2, QP4 = qd
+    QDP1, QDP3, QDP2, QDP4 = qdd
     G21 = G[0]
     G23 = G[1]
     G41 = G[2]
@@ -398,20 +386,11 @@ def _regressor_block(q, qd, qdd, G, D, L0, L1, L2, L3, L4, g):
 
 
 def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
-    """Fill GAM, shape (2, N). q, qd, qdd: (5, N); G: (3*2, N)."""
+    """Fill GAM, shape (2, N). q, qd, qdd: (4, N); G: (2*2, N)."""
     # Inputs
-    q1 = q[0]
-    q3 = q[1]
-    q2 = q[2]
-    q4 = q[3]
-    QP1 = qd[0]
-    QP3 = qd[1]
-    QP2 = qd[2]
-    QP4 = qd[3]
-    QDP1 = qdd[0]
-    QDP3 = qdd[1]
-    QDP2 = qdd[2]
-    QDP4 = qdd[3]
+    q1, q3, q2, q4 = q
+    QP1, QP3, QP2, QP4 = qd
+    QDP1, QDP3, QDP2, QDP4 = qdd
     G21 = G[0]
     G23 = G[1]
     G41 = G[2]
@@ -471,7 +450,7 @@ def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
 
 
 def _inertia_matrix_block(q, qd, qdd, G, A, X, L0, L1, L2, L3, L4, g):
-    """Fill A, shape (2, 2, N): column i is Gamma for a unit acceleration of joint i from rest. q, qd, qdd: (5, N); G: (3*2, N)."""
+    """Fill A, shape (2, 2, N): column i is Gamma for a unit acceleration of joint i from rest. q, qd, qdd: (4, N); G: (2*2, N)."""
     # Inputs
     q2 = q[2]
     q4 = q[3]
@@ -524,16 +503,10 @@ def _inertia_matrix_block(q, qd, qdd, G, A, X, L0, L1, L2, L3, L4, g):
 
 
 def _bias_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
-    """Fill GAM, shape (2, N), for qdd = 0. q, qd, qdd: (5, N); G: (3*2, N)."""
+    """Fill GAM, shape (2, N), for qdd = 0. q, qd, qdd: (4, N); G: (2*2, N)."""
     # Inputs
-    q1 = q[0]
-    q3 = q[1]
-    q2 = q[2]
-    q4 = q[3]
-    QP1 = qd[0]
-    QP3 = qd[1]
-    QP2 = qd[2]
-    QP4 = qd[3]
+    q1, q3, q2, q4 = q
+    QP1, QP3, QP2, QP4 = qd
     QDP2 = qdd[2]
     QDP4 = qdd[3]
     G21 = G[0]
@@ -605,12 +578,9 @@ def _bias_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
 
 
 def _gravity_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
-    """Fill GAM, shape (2, N), at rest. q, qd, qdd: (5, N); G: (3*2, N)."""
+    """Fill GAM, shape (2, N), at rest. q, qd, qdd: (4, N); G: (2*2, N)."""
     # Inputs
-    q1 = q[0]
-    q3 = q[1]
-    q2 = q[2]
-    q4 = q[3]
+    q1, q3, q2, q4 = q
     G21 = G[0]
     G23 = G[1]
     G41 = G[2]
@@ -660,9 +630,9 @@ def _gravity_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
 
 
 def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, L4, g):
-    """Fill T, shape (6, 4, 4, N). q, qd, qdd: (5, N); G: (3*2, N)."""
+    """Fill T, shape (6, 4, 4, N). q, qd, qdd: (4, N); G: (2*2, N)."""
     # Inputs
-    q1, q3, q2, q4, q5 = q
+    q1, q3, q2, q4 = q
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -674,9 +644,6 @@ def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, L4, g):
     th34 = q3 + q4
     C34 = np.cos(th34)
     S34 = np.sin(th34)
-    th125 = th12 + q5
-    C125 = np.cos(th125)
-    S125 = np.sin(th125)
     # Frame 2
     P12 = L1*C1
     P22 = L1*S1
@@ -738,11 +705,11 @@ def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, L4, g):
     T[3, 0, 3] = P14
     T[3, 1, 3] = P24
     T[3, 2, 3] = 0.0
-    T[4, 0, 0] = C125
-    T[4, 0, 1] = -S125
+    T[4, 0, 0] = C34
+    T[4, 0, 1] = -S34
     T[4, 0, 2] = 0.0
-    T[4, 1, 0] = S125
-    T[4, 1, 1] = C125
+    T[4, 1, 0] = S34
+    T[4, 1, 1] = C34
     T[4, 1, 2] = 0.0
     T[4, 2, 0] = 0.0
     T[4, 2, 1] = 0.0
@@ -765,9 +732,9 @@ def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, L4, g):
 
 
 def _closure_block(q, R, L0, L1, L2, L3, L4, g):
-    """Fill R, shape (3, 1 + 5, N): closure residuals, then their derivatives by the joints. q: (5, N)."""
+    """Fill R, shape (2, 1 + 4, N): closure residuals, then their derivatives by the joints. q: (4, N)."""
     # Inputs
-    q1, q3, q2, q4, q5 = q
+    q1, q3, q2, q4 = q
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -779,9 +746,6 @@ def _closure_block(q, R, L0, L1, L2, L3, L4, g):
     th34 = q3 + q4
     C34 = np.cos(th34)
     S34 = np.sin(th34)
-    th125 = th12 + q5
-    C125 = np.cos(th125)
-    S125 = np.sin(th125)
     # Frame 2
     P12 = L1*C1
     P22 = L1*S1
@@ -799,34 +763,24 @@ def _closure_block(q, R, L0, L1, L2, L3, L4, g):
     P16 = P14 + C34L4
     S34L4 = L4*S34
     P26 = P24 + S34L4
-    # Loop: frame 6 on frame 5
-    C34C125pS34S125x2 = 2*(C34*C125 + S34*S125)
     # Residuals and their derivatives by the joints
     R[0, 0] = P15 - P16
     R[1, 0] = P25 - P26
-    R[2, 0] = 2*(S34*C125 - C34*S125)
     R[0, 1] = -P25
     R[0, 2] = P26
     R[0, 3] = -S12L2
     R[0, 4] = S34L4
-    R[0, 5] = 0.0
     R[1, 1] = P15
     R[1, 2] = -C3L3 - C34L4
     R[1, 3] = C12L2
     R[1, 4] = -C34L4
-    R[1, 5] = 0.0
-    R[2, 1] = -C34C125pS34S125x2
-    R[2, 2] = C34C125pS34S125x2
-    R[2, 3] = -C34C125pS34S125x2
-    R[2, 4] = C34C125pS34S125x2
-    R[2, 5] = -C34C125pS34S125x2
 
 
 def _curvature_block(q, qd, B, L0, L1, L2, L3, L4, g):
-    """Fill B, shape (3 + 1, N): second derivatives of the residuals at constant rates; trace of A_cut' A_twin. q, qd: (5, N)."""
+    """Fill B, shape (2 + 0, N): second derivatives of the residuals at constant rates, then traces of A_cut' A_twin. q, qd: (4, N)."""
     # Inputs
-    q1, q3, q2, q4, q5 = q
-    QP1, QP3, QP2, QP4, QP5 = qd
+    q1, q3, q2, q4 = q
+    QP1, QP3, QP2, QP4 = qd
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -838,24 +792,9 @@ def _curvature_block(q, qd, B, L0, L1, L2, L3, L4, g):
     th34 = q3 + q4
     C34 = np.cos(th34)
     S34 = np.sin(th34)
-    th125 = th12 + q5
-    C125 = np.cos(th125)
-    S125 = np.sin(th125)
     # Inputs
     QP1pQP2 = QP1 + QP2
     QP3pQP4 = QP3 + QP4
-    S34QP3pQP4 = S34*QP3pQP4
-    C34QP3pQP4 = C34*QP3pQP4
-    QP3pQP4C34QP3pQP4 = QP3pQP4*C34QP3pQP4
-    QP3pQP4S34QP3pQP4 = QP3pQP4*S34QP3pQP4
-    QP5pQP1pQP2 = QP5 + QP1pQP2
-    S125QP5pQP1pQP2 = S125*QP5pQP1pQP2
-    C125QP5pQP1pQP2 = C125*QP5pQP1pQP2
-    # Loop: frame 6 on frame 5
-    C34C125 = C34*C125
-    S34S125 = S34*S125
-    # Second derivatives at constant rates; traces
-    B[0] = L3*QP3*QP3*C3 + L4*QP3pQP4C34QP3pQP4 - L1*QP1*QP1*C1 - L2*QP1pQP2*C12*QP1pQP2
-    B[1] = L3*QP3*QP3*S3 + L4*QP3pQP4S34QP3pQP4 - L1*QP1*QP1*S1 - L2*QP1pQP2*S12*QP1pQP2
-    B[2] = -2*(S34*QP5pQP1pQP2*C125QP5pQP1pQP2 + QP3pQP4S34QP3pQP4*C125 + 2*C34QP3pQP4*S125QP5pQP1pQP2 - C34*QP5pQP1pQP2*S125QP5pQP1pQP2 - QP3pQP4C34QP3pQP4*S125 - 2*S34QP3pQP4*C125QP5pQP1pQP2)
-    B[3] = 1 + C34C125 + S34S125 + C34C125 + S34S125
+    # Second derivatives at constant rates
+    B[0] = L3*QP3*QP3*C3 + L4*QP3pQP4*C34*QP3pQP4 - L1*QP1*QP1*C1 - L2*QP1pQP2*C12*QP1pQP2
+    B[1] = L3*QP3*QP3*S3 + L4*QP3pQP4*S34*QP3pQP4 - L1*QP1*QP1*S1 - L2*QP1pQP2*S12*QP1pQP2

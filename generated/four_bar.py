@@ -17,7 +17,8 @@ Element     FV      viscous: along q1
 Element     FS      coulomb: along q1
 Element     OFFSET  offset: along q1
 Loop        frame 5 coincides with cut frame 4
-Loop        q2, q3, q4 from the closure equations by Newton; assembly mode of q1 = 1, q2 = -0.5518, q3 = 1.296, q4 = 0.8475
+Loop        q4 = -q1 - q2 + q3
+Loop        q2, q3 from the closure equations by Newton; assembly mode of q1 = 1, q2 = -0.5518, q3 = 1.296
 
 Base parameters, 11 of 34; Gautier and Khalil (1990), recognised from 60-digit sampling
     ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L3*MX3
@@ -34,9 +35,9 @@ Cost per sample
     inertia_matrix    13 multiplications, 8 additions, 1 sin, 1 cos
     bias              28 multiplications, 18 additions, 3 sin, 2 cos
     gravity           14 multiplications, 8 additions, 3 sin, 2 cos
-    frame_poses       6 multiplications, 5 additions, 4 sin, 4 cos
-    closure           12 multiplications, 9 additions, 4 sin, 4 cos
-    curvature         33 multiplications, 17 additions, 4 sin, 4 cos
+    frame_poses       6 multiplications, 4 additions, 3 sin, 3 cos
+    closure           6 multiplications, 6 additions, 3 sin, 3 cos
+    curvature         18 multiplications, 6 additions, 3 sin, 3 cos
 """
 
 import numpy as np
@@ -74,10 +75,10 @@ LIMITS = {}
 VALUES = {}
 _PATHS = {
     1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))), 3: ((3, 0, ((2, 1.0),)),),
-    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))), 5: ((3, 0, ((2, 1.0),)),),
+    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (4, 0, ((2, 1.0), (0, -1.0), (1, -1.0)))), 5: ((3, 0, ((2, 1.0),)),),
 }
-_START = (1.0, -0.5518306301574998, 1.2956336780546933, 0.8474643082121931)
-_MODE = 1.0  # sign of det J_u in the assembly mode of _START
+_START = (1.0, -0.5518306301574998, 1.2956336780546933)
+_MODE = -1.0  # sign of det J_u in the assembly mode of _START
 
 
 class Store(np.ndarray):
@@ -201,7 +202,7 @@ def frame_poses(q, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
 def jacobian(q, *, frame=5, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
     """J, shape (N, 6, 1): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
     T = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, g=g).reshape(-1, 5, 4, 4)
-    J = np.zeros((len(T), 6, 4))
+    J = np.zeros((len(T), 6, 3))
     P = T[:, (5 if frame is None else frame) - 1, :3, 3]
     for j, sigma, rates in _PATHS[5 if frame is None else frame]:
         z = T[:, j - 1, :3, 2]
@@ -209,7 +210,7 @@ def jacobian(q, *, frame=5, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    G = _closed(q, None, None, L0, L1, L2, L3, g)[3].reshape(-1, 3, 1)
+    G = _closed(q, None, None, L0, L1, L2, L3, g)[3].reshape(-1, 2, 1)
     J = J[..., :1] + J[..., 1:] @ G
     return J[0] if np.ndim(q) == 1 else J
 
@@ -217,25 +218,25 @@ def jacobian(q, *, frame=5, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
 def passive_joints(q, qd=None, qdd=None, *, L0=0.45, L1=0.2, L2=0.5, L3=0.4, g=9.81):
     """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also their accelerations."""
     rates = np.array([
-        [0, 1, 0, 0],
-        [0, 0, 1, 0],
-        [0, 0, 0, 1],
+        [0, 1, 0],
+        [0, 0, 1],
+        [-1, -1, 1],
     ], dtype=float)
     offsets = np.array([0, 0, 0], dtype=float)
-    states = [x.reshape(*np.shape(q)[:-1], 4) for x in _closed(q, qd, qdd, L0, L1, L2, L3, g)[:3]]
+    states = [x.reshape(*np.shape(q)[:-1], 3) for x in _closed(q, qd, qdd, L0, L1, L2, L3, g)[:3]]
     found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
     found[0] += offsets
     return found[0] if len(found) == 1 else tuple(found)
 
 
 def _closed(q, qd, qdd, *constants):
-    """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 4), and G (N, 3*1), rates of the tied ones."""
+    """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 3), and G (N, 2*1), rates of the tied ones."""
     q = np.atleast_2d(np.asarray(q, dtype=float))
     N = len(q)
     qd = np.zeros_like(q) if qd is None else np.atleast_2d(np.asarray(qd, dtype=float))
     qdd = np.zeros_like(q) if qdd is None else np.atleast_2d(np.asarray(qdd, dtype=float))
     q = np.concatenate([q, _assembled(q, *constants)], axis=1)
-    J = _fill(_closure_block, np.empty((3, 5, N)), (q,), *constants)[:, 1:]
+    J = _fill(_closure_block, np.empty((2, 4, N)), (q,), *constants)[:, 1:]
     J_a, J_u = J[:, :1], J[:, 1:]
     volume = _determinant(J_u) / np.prod(np.sqrt((J**2).sum(axis=1)), axis=0)
     if (np.abs(volume) < 1e-6).any():  # a dead point is found to half the digits of the closure
@@ -243,17 +244,17 @@ def _closed(q, qd, qdd, *constants):
         raise ValueError(f"singular configuration at sample {t}: q = {q[t, :1]}, tied joints {q[t, 1:]} move freely there")
     G = -_solved(J_u, J_a)
     qd = np.concatenate([qd, np.einsum("uit,ti->tu", G, qd)], axis=1)
-    B = _fill(_curvature_block, np.empty((4, N)), (q, qd), *constants)
-    other = (volume * _MODE < 0) | (B[3:] < 0).any(axis=0)  # beyond a dead point, or frames opposite (trace -1, not 3)
+    B = _fill(_curvature_block, np.empty((2, N)), (q, qd), *constants)
+    other = (volume * _MODE < 0) | (B[2:] < 0).any(axis=0)  # beyond a dead point, or frames opposite (trace -1, not 3)
     if other.any():
         t = int(other.argmax())
         raise ValueError(f"the mechanism does not close in the assembly mode of _START at sample {t}: q = {q[t, :1]}")
-    qdd = np.concatenate([qdd, np.einsum("uit,ti->tu", G, qdd) - _solved(J_u, B[:3]).T], axis=1)
-    return q, qd, qdd, G.reshape(3, N).T
+    qdd = np.concatenate([qdd, np.einsum("uit,ti->tu", G, qdd) - _solved(J_u, B[:2]).T], axis=1)
+    return q, qd, qdd, G.reshape(2, N).T
 
 
 def _assembled(q, *constants):
-    """Tied joints (N, 3) that close the loops, in the assembly mode of _START and continuous in q.
+    """Tied joints (N, 2) that close the loops, in the assembly mode of _START and continuous in q.
 
     Along a smooth record only knots are followed from _START; the samples between them start from interpolation.
     """
@@ -267,7 +268,7 @@ def _assembled(q, *constants):
     steps = int(np.ceil(np.abs(away).max(initial=0.0) / 0.2))
     for s in range(1, steps):
         x, _ = _newton(start + s / steps * away, x, 2, *constants)
-    x = x + turns * np.array((-1, 0, 0))  # turns of the tied joints per turn of joint 1
+    x = x + turns * np.array((-1, 0))  # turns of the tied joints per turn of joint 1
     x, residual = _newton(q[knots], x, 20, *constants)
     if every > 1:
         x = np.stack([np.interp(np.arange(N), knots, column) for column in x.T], axis=1)
@@ -281,41 +282,32 @@ def _assembled(q, *constants):
 def _newton(q, x, passes, *constants):
     """At most `passes` Newton steps on the tied joints x; returns x and the largest residual of each sample."""
     for k in range(passes + 1):
-        R = _fill(_closure_block, np.empty((3, 5, len(q))), (np.concatenate([q, x], axis=1),), *constants)
+        R = _fill(_closure_block, np.empty((2, 4, len(q))), (np.concatenate([q, x], axis=1),), *constants)
         residual = np.abs(R[:, 0]).max(axis=0)
         if k == passes or not residual.max(initial=0.0) > 1e-13:
             return x, residual
-        step = _solved(R[:, 2:] + 1e-14 * np.eye(3)[..., None], R[:, 0])  # a singular sample ends as one that does not close
+        step = _solved(R[:, 2:] + 1e-14 * np.eye(2)[..., None], R[:, 0])  # a singular sample ends as one that does not close
         x = x - np.clip(step, -0.5, 0.5).T
 
 
 def _determinant(J):
-    """det J for every sample, J (3, 3, N)."""
-    return (J[0] * _cross(J[1], J[2])).sum(axis=0)
+    """det J for every sample, J (2, 2, N)."""
+    return J[0, 0]*J[1, 1] - J[0, 1]*J[1, 0]
 
 
 def _solved(J, b):
-    """J**-1 b for every sample, J (3, 3, N), b (3, ..., N), by Cramer's rule."""
-    columns = _cross(J[1], J[2]), _cross(J[2], J[0]), _cross(J[0], J[1])  # of the inverse times the determinant
-    return np.stack([columns[0][k]*b[0] + columns[1][k]*b[1] + columns[2][k]*b[2] for k in range(3)]) / _determinant(J)
-
-
-def _cross(u, v):
-    """u x v for every sample."""
-    return np.stack([u[1]*v[2] - u[2]*v[1], u[2]*v[0] - u[0]*v[2], u[0]*v[1] - u[1]*v[0]])
+    """J**-1 b for every sample, J (2, 2, N), b (2, ..., N), by Cramer's rule."""
+    (J11, J12), (J21, J22) = J
+    return np.stack([J22*b[0] - J12*b[1], J11*b[1] - J21*b[0]]) / _determinant(J)
 
 
 def _regressor_block(q, qd, qdd, G, D, L0, L1, L2, L3, g):
-    """Fill D, shape (11, 1, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (4, N); G: (3*1, N)."""
+    """Fill D, shape (11, 1, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (3, N); G: (2*1, N)."""
     # Inputs
-    q1 = q[0]
-    q2 = q[1]
-    q3 = q[2]
+    q1, q2, q3 = q
     QP1 = qd[0]
     QP2 = qd[1]
-    QDP1 = qdd[0]
-    QDP2 = qdd[1]
-    QDP3 = qdd[2]
+    QDP1, QDP2, QDP3 = qdd
     G21 = G[0]
     G31 = G[1]
     # Trigonometry
@@ -355,16 +347,12 @@ def _regressor_block(q, qd, qdd, G, D, L0, L1, L2, L3, g):
 
 
 def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, g):
-    """Fill GAM, shape (1, N). q, qd, qdd: (4, N); G: (3*1, N)."""
+    """Fill GAM, shape (1, N). q, qd, qdd: (3, N); G: (2*1, N)."""
     # Inputs
-    q1 = q[0]
-    q2 = q[1]
-    q3 = q[2]
+    q1, q2, q3 = q
     QP1 = qd[0]
     QP2 = qd[1]
-    QDP1 = qdd[0]
-    QDP2 = qdd[1]
-    QDP3 = qdd[2]
+    QDP1, QDP2, QDP3 = qdd
     G21 = G[0]
     G31 = G[1]
     ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3 = X
@@ -403,7 +391,7 @@ def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, g):
 
 
 def _inertia_matrix_block(q, qd, qdd, G, A, X, L0, L1, L2, L3, g):
-    """Fill A, shape (1, 1, N): column i is Gamma for a unit acceleration of joint i from rest. q, qd, qdd: (4, N); G: (3*1, N)."""
+    """Fill A, shape (1, 1, N): column i is Gamma for a unit acceleration of joint i from rest. q, qd, qdd: (3, N); G: (2*1, N)."""
     # Inputs
     q2 = q[1]
     G21 = G[0]
@@ -434,11 +422,9 @@ def _inertia_matrix_block(q, qd, qdd, G, A, X, L0, L1, L2, L3, g):
 
 
 def _bias_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, g):
-    """Fill GAM, shape (1, N), for qdd = 0. q, qd, qdd: (4, N); G: (3*1, N)."""
+    """Fill GAM, shape (1, N), for qdd = 0. q, qd, qdd: (3, N); G: (2*1, N)."""
     # Inputs
-    q1 = q[0]
-    q2 = q[1]
-    q3 = q[2]
+    q1, q2, q3 = q
     QP1 = qd[0]
     QP2 = qd[1]
     QDP2 = qdd[1]
@@ -488,11 +474,9 @@ def _bias_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, g):
 
 
 def _gravity_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, g):
-    """Fill GAM, shape (1, N), at rest. q, qd, qdd: (4, N); G: (3*1, N)."""
+    """Fill GAM, shape (1, N), at rest. q, qd, qdd: (3, N); G: (2*1, N)."""
     # Inputs
-    q1 = q[0]
-    q2 = q[1]
-    q3 = q[2]
+    q1, q2, q3 = q
     G21 = G[0]
     G31 = G[1]
     MX1R = X[1]
@@ -527,9 +511,9 @@ def _gravity_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, g):
 
 
 def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, g):
-    """Fill T, shape (5, 4, 4, N). q, qd, qdd: (4, N); G: (3*1, N)."""
+    """Fill T, shape (5, 4, 4, N). q, qd, qdd: (3, N); G: (2*1, N)."""
     # Inputs
-    q1, q2, q3, q4 = q
+    q1, q2, q3 = q
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -538,9 +522,6 @@ def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, g):
     S12 = np.sin(th12)
     C3 = np.cos(q3)
     S3 = np.sin(q3)
-    th124 = th12 + q4
-    C124 = np.cos(th124)
-    S124 = np.sin(th124)
     # Frame 2
     P12 = L1*C1
     P22 = L1*S1
@@ -587,11 +568,11 @@ def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, g):
     T[2, 0, 3] = L0
     T[2, 1, 3] = 0.0
     T[2, 2, 3] = 0.0
-    T[3, 0, 0] = C124
-    T[3, 0, 1] = -S124
+    T[3, 0, 0] = C3
+    T[3, 0, 1] = -S3
     T[3, 0, 2] = 0.0
-    T[3, 1, 0] = S124
-    T[3, 1, 1] = C124
+    T[3, 1, 0] = S3
+    T[3, 1, 1] = C3
     T[3, 1, 2] = 0.0
     T[3, 2, 0] = 0.0
     T[3, 2, 1] = 0.0
@@ -614,9 +595,9 @@ def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, g):
 
 
 def _closure_block(q, R, L0, L1, L2, L3, g):
-    """Fill R, shape (3, 1 + 4, N): closure residuals, then their derivatives by the joints. q: (4, N)."""
+    """Fill R, shape (2, 1 + 3, N): closure residuals, then their derivatives by the joints. q: (3, N)."""
     # Inputs
-    q1, q2, q3, q4 = q
+    q1, q2, q3 = q
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -625,9 +606,6 @@ def _closure_block(q, R, L0, L1, L2, L3, g):
     S12 = np.sin(th12)
     C3 = np.cos(q3)
     S3 = np.sin(q3)
-    th124 = th12 + q4
-    C124 = np.cos(th124)
-    S124 = np.sin(th124)
     # Frame 2
     P12 = L1*C1
     P22 = L1*S1
@@ -640,31 +618,22 @@ def _closure_block(q, R, L0, L1, L2, L3, g):
     C3L3 = L3*C3
     P15 = L0 + C3L3
     P25 = L3*S3
-    # Loop: frame 5 on frame 4
-    C3C124pS3S124x2 = 2*(C3*C124 + S3*S124)
     # Residuals and their derivatives by the joints
     R[0, 0] = P14 - P15
     R[1, 0] = P24 - P25
-    R[2, 0] = 2*(S3*C124 - C3*S124)
     R[0, 1] = -P24
     R[0, 2] = -S12L2
     R[0, 3] = P25
-    R[0, 4] = 0.0
     R[1, 1] = P14
     R[1, 2] = C12L2
     R[1, 3] = -C3L3
-    R[1, 4] = 0.0
-    R[2, 1] = -C3C124pS3S124x2
-    R[2, 2] = -C3C124pS3S124x2
-    R[2, 3] = C3C124pS3S124x2
-    R[2, 4] = -C3C124pS3S124x2
 
 
 def _curvature_block(q, qd, B, L0, L1, L2, L3, g):
-    """Fill B, shape (3 + 1, N): second derivatives of the residuals at constant rates; trace of A_cut' A_twin. q, qd: (4, N)."""
+    """Fill B, shape (2 + 0, N): second derivatives of the residuals at constant rates, then traces of A_cut' A_twin. q, qd: (3, N)."""
     # Inputs
-    q1, q2, q3, q4 = q
-    QP1, QP2, QP3, QP4 = qd
+    q1, q2, q3 = q
+    QP1, QP2, QP3 = qd
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -673,23 +642,8 @@ def _curvature_block(q, qd, B, L0, L1, L2, L3, g):
     S12 = np.sin(th12)
     C3 = np.cos(q3)
     S3 = np.sin(q3)
-    th124 = th12 + q4
-    C124 = np.cos(th124)
-    S124 = np.sin(th124)
     # Inputs
     QP1pQP2 = QP1 + QP2
-    QP3S3 = QP3*S3
-    QP3C3 = QP3*C3
-    QP3QP3C3 = QP3*QP3C3
-    QP3QP3S3 = QP3*QP3S3
-    QP4pQP1pQP2 = QP4 + QP1pQP2
-    S124QP4pQP1pQP2 = S124*QP4pQP1pQP2
-    C124QP4pQP1pQP2 = C124*QP4pQP1pQP2
-    # Loop: frame 5 on frame 4
-    C3C124 = C3*C124
-    S3S124 = S3*S124
-    # Second derivatives at constant rates; traces
-    B[0] = L3*QP3QP3C3 - L1*QP1*QP1*C1 - L2*QP1pQP2*C12*QP1pQP2
-    B[1] = L3*QP3QP3S3 - L1*QP1*QP1*S1 - L2*QP1pQP2*S12*QP1pQP2
-    B[2] = -2*(S3*QP4pQP1pQP2*C124QP4pQP1pQP2 + QP3QP3S3*C124 + 2*QP3C3*S124QP4pQP1pQP2 - C3*QP4pQP1pQP2*S124QP4pQP1pQP2 - QP3QP3C3*S124 - 2*QP3S3*C124QP4pQP1pQP2)
-    B[3] = 1 + C3C124 + S3S124 + C3C124 + S3S124
+    # Second derivatives at constant rates
+    B[0] = L3*QP3*QP3*C3 - L1*QP1*QP1*C1 - L2*QP1pQP2*C12*QP1pQP2
+    B[1] = L3*QP3*QP3*S3 - L1*QP1*QP1*S1 - L2*QP1pQP2*S12*QP1pQP2

@@ -53,7 +53,7 @@ class Geometry:
         self.rotation: dict[int, Rotation] = {}
         self.P: dict[int, Vector] = {}  # P_ij, origin of frame j in frame i = ant(j)
         self.carrier: dict[int, Carrier] = {}
-        self._turn: dict[int, tuple[Turn, Expression]] = {}  # turn from the carrier to frame j
+        self.turn: dict[int, tuple[Turn, Expression]] = {}  # angle from the carrier to frame j
         for f in robot.frames:
             self._frame(f)
 
@@ -77,11 +77,11 @@ class Geometry:
         self.P[j] = (add(mul(d, cg), mul(r, A[0][2])), add(mul(d, sg), mul(r, A[1][2])), add(b, mul(r, A[2][2])))
         if parallel and f.ant:
             inner = self.carrier[f.ant]
-            turn, offset = _sum(self._turn[f.ant][0] + turn), self._turn[f.ant][1] + offset
+            turn, offset = _sum(self.turn[f.ant][0] + turn), self.turn[f.ant][1] + offset
             self.carrier[j] = Carrier(inner.m, self._rotation(inner.rotation.A, turn, offset), turn)
         else:
             self.carrier[j] = Carrier(f.ant, self.rotation[j], turn)
-        self._turn[j] = (turn, offset)
+        self.turn[j] = (turn, offset)
 
     def _rotation(self, A: Matrix | None, turn: Turn, offset: Expression) -> Rotation:
         c, s = self.algebra.cos_sin(turn, offset)

@@ -53,9 +53,12 @@ class LoopSystem:
         return [rows[k] for k in self.chosen]
 
     def alignment(self, algebra: Algebra) -> list[Scalar]:
-        """Trace of A_cut' A_twin of every loop: 3 where it closes, -1 half a turn from there, where the axial vector is zero too."""
+        """Trace of A_cut' A_twin: 3 where a loop closes, -1 half a turn from there, where the axial vector is zero too.
+
+        Of the loops alone whose cut joint is tied: where it is a sum of angles, the orientations agree by construction.
+        """
         pose = frame_poses(Geometry(self.robot, algebra, self.closure))
-        rotations = [(pose[loop.cut][0], pose[loop.twin][0]) for loop in self.robot.loops]
+        rotations = [(pose[loop.cut][0], pose[loop.twin][0]) for loop in self.robot.loops if loop.cut in self.closure.tied]
         return [dot([x for row in A for x in row], [x for row in B for x in row]) for A, B in rotations]
 
     def jacobian(self, algebra: Algebra) -> list[list[Scalar]]:

@@ -171,7 +171,6 @@ def find_relations(robot: Robot) -> Found:
                 path=("frames", j, "mu"),
             )
     rng = np.random.default_rng(3)
-    solutions = 0
     general: dict[int, float] | None = None
     wanted = {j: x for loop in robot.loops for j, x in loop.start.items()}
     for attempt in range(STARTS):
@@ -180,7 +179,6 @@ def find_relations(robot: Robot) -> Found:
         q = equations.solve(q0) if robot.loops else q0
         if q is None:
             continue
-        solutions += 1
         _check_mobility(robot, equations, q)
         general = q if general is None else general
         found = _linear(robot, equations, relations, q)
@@ -190,8 +188,40 @@ def find_relations(robot: Robot) -> Found:
             break
     if general is None:
         raise _cannot_close(robot, equations)
-    row = {j: r for j, (r, _) in relations.items()}
-    return Found(row, {j: c for j, (_, c) in relations.items()}, equations.unknown, equations.configuration(general))
+    return _general(robot, equations, relations, general)
+
+
+def _general(
+    robot: Robot, equations: LoopEquations, relations: Mapping[int, tuple[Mapping[int, Expression], Expression]], q: Mapping[int, float]
+) -> Found:
+    """The solution q as a general closure: declared relations, the sums of angles that planar loops fix, the rest tied."""
+    row: dict[int, Mapping[int, Expression]] = {j: r for j, (r, _) in relations.items()}
+    offset = {j: c for j, (_, c) in relations.items()}
+    configuration = equations.configuration(q)
+    for loop in robot.loops:
+        found = _angle_sum(robot, loop, configuration)
+        if found is not None and loop.cut in equations.unknown and set(found[0]) <= set(equations.free):
+            row[loop.cut], offset[loop.cut] = found
+    tied = tuple(j for j in equations.unknown if j not in row)
+    return Found(row, offset, tied, configuration)
+
+
+def _angle_sum(robot: Robot, loop: Loop, configuration: Mapping[int, float]) -> tuple[dict[int, Expression], Expression] | None:
+    """q_cut in the other angles of a loop of parallel axes: cut and twin frame are turned alike about one axis."""
+    geometry = Geometry(robot, FloatAlgebra(robot, {j: np.asarray(x) for j, x in configuration.items()}), open_tree(robot))
+    cut, twin = geometry.carrier[loop.cut], geometry.carrier[loop.twin]
+    if robot.frame(loop.cut).sigma != REVOLUTE or cut.m != twin.m or cut.rotation.A != twin.rotation.A:
+        return None
+    total: dict[int, int] = {}
+    for sign, frame in ((1, loop.twin), (-1, loop.cut)):
+        for j, n in geometry.turn[frame][0]:
+            total[j] = total.get(j, 0) + sign * n
+    if total.pop(loop.cut, 0) != -1:
+        return None
+    row = {j: Expression.number(n) for j, n in total.items() if n}
+    offset = geometry.turn[loop.twin][1] - geometry.turn[loop.cut][1]
+    now = offset.value(robot.constants) + sum(n * configuration[j] for j, n in total.items())
+    return row, offset + PI * (2 * round((configuration[loop.cut] - now) / (2 * np.pi)))
 
 
 def _check_mobility(robot: Robot, equations: LoopEquations, q: Mapping[int, float]) -> None:

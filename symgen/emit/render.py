@@ -34,7 +34,7 @@ LOOP_SUMMARIES = {
     "closure": ("q, R", "Fill R, shape ({m}, 1 + {k}, N): closure residuals, then their derivatives by the joints. q: ({k}, N)."),
     "curvature": (
         "q, qd, B",
-        "Fill B, shape ({m} + {loops}, N): second derivatives of the residuals at constant rates; trace of A_cut' A_twin. q, qd: ({k}, N).",
+        "Fill B, shape ({m} + {loops}, N): second derivatives of the residuals at constant rates, then traces of A_cut' A_twin. q, qd: ({k}, N).",
     ),
 }
 
@@ -59,7 +59,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         "k": len(closure.independent),
         "b": len(regrouping),
         "frames": len(robot.frames),
-        "loops": len(robot.loops),
+        "loops": sum(loop.cut in closure.tied for loop in robot.loops),
         "p": len(robot.parameters),
     }
     context = {

@@ -247,7 +247,7 @@ def _closure(robot: Robot) -> Function:
 def _curvature(robot: Robot) -> Function:
     algebra, system = GraphAlgebra(robot), loop_system(robot)
     values = [*system.curvature(algebra), *system.alignment(algebra)]
-    return _assignments(robot, algebra, [(f"B[{k}]", x) for k, x in enumerate(values)], "Second derivatives at constant rates; traces")
+    return _assignments(robot, algebra, [(f"B[{k}]", x) for k, x in enumerate(values)], "Second derivatives at constant rates")
 
 
 def _assignments(robot: Robot, algebra: GraphAlgebra, entries: Sequence[tuple[str, Scalar | int]], title: str) -> Function:

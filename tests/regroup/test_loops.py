@@ -83,12 +83,15 @@ def test_declared_relations_that_agree_change_nothing() -> None:
     assert {j: text.replace("-pi", "pi") for j, text in relations(declared).items()} == relations(load_robot("haptic"))
 
 
-@pytest.mark.parametrize(("name", "tied"), [("four_bar", (2, 3, 4)), ("five_bar", (2, 4, 5))])
-def test_general_loops_have_no_linear_relation(name: str, tied: tuple[int, ...]) -> None:
-    """They keep the assembly mode of the file: the configuration found is the one of `start`."""
+@pytest.mark.parametrize(
+    ("name", "tied", "angles"), [("four_bar", (2, 3), {4: "-q1 - q2 + q3"}), ("five_bar", (2, 4), {5: "-q1 - q2 + q3 + q4"})]
+)
+def test_general_loops_have_one_sum_of_angles(name: str, tied: tuple[int, ...], angles: dict[int, str]) -> None:
+    """The rest is tied, and they keep the assembly mode of the file: the configuration found is the one of `start`."""
     robot = load_robot(name)
     closure = close(robot)
     assert closure.tied == tied
+    assert {j: text for j, text in relations(robot).items() if j not in tied} == angles
     assert {j: closure.start[j] for j in robot.loops[0].start} == pytest.approx(dict(robot.loops[0].start), abs=1e-3)
 
 
