@@ -9,6 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from symgen.derive.lagrange import Lagrange
 from symgen.description import Robot, load_robot, parse_robot
 from symgen.emit import generate_module
 from symgen.errors import SymgenError
@@ -142,3 +143,28 @@ def test_a_constant_named_as_a_quantity_is_refused(constant: str) -> None:
 
 def test_same_bytes_twice() -> None:
     assert generate_module(load_robot("two_branch")) == generate_module(load_robot("two_branch"))
+
+
+def chain(n: int) -> Robot:
+    """n joints in a row, every fifth prismatic, parallel and perpendicular axes in turn."""
+    twist = ("0", "pi/2", "0", "-pi/2", "pi/2")
+    rows = []
+    for j in range(1, n + 1):
+        slides = j % 5 == 0
+        place = f"theta: 0, r: q{j}" if slides else f"theta: q{j}, r: 0"
+        rows.append(f"  {j}: {{ant: {j - 1}, sigma: {int(slides)}, alpha: {twist[j % 5]}, d: {'L' if j % 2 else 0}, {place}}}")
+    head = f"symgen: 1\nname: chain\ntitle: chain of {n}\nsource: made up\ngravity: [0, -g, 0]\nconstants: {{L: 0.3, g: 9.81}}\nframes:\n"
+    return parse_robot((head + "\n".join(rows)).encode(), "chain.yaml")
+
+
+def test_more_than_nine_joints_have_separated_indices() -> None:
+    """W1_12, not W112; and the module is that of CasADi energies."""
+    robot = chain(12)
+    text = generate_module(robot)
+    assert "W1_12 = " in text and "WP1_11 = " in text and "th1_2 = " in text and "W112" not in text
+    module, model = loaded(robot), Lagrange(robot)
+    q, qd, qdd = states(12, 3)
+    chi = np.random.default_rng(5).standard_normal(len(robot.parameters))
+    tau = model.torque(q, qd, qdd, chi)
+    found = module.regressor(q, qd, qdd) @ module.base_parameters(chi)
+    assert np.abs(found - tau).max() <= 1e-10 * np.abs(tau).max()
