@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
+from symgen.derive.columns import element_names
 from symgen.derive.loops import close
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, Robot
@@ -37,11 +38,24 @@ def header(spec: ModuleSpec) -> list[str]:
     if alone:
         lines += wrapped("as they are: " + " ".join(alone), "    ")
     lines += wrapped("No effect: " + (" ".join(regrouping.no_effect) or "none"), "")
+    absorbing = one_sided_friction_that_absorbs(spec)
+    if absorbing:
+        lines += wrapped(
+            f"In motion only: {' '.join(absorbing)} take in a constant force that no offset tells from friction; at rest, "
+            "in `gravity` and in `bias` at qd = 0, that force is missing.",
+            "",
+        )
     lines += ["", "Cost per sample"]
     for name in ("regressor", "inverse_dynamics", "inertia_matrix", "bias", "gravity", "frame_poses", "closure", "curvature"):
         if getattr(spec, name) is not None:
             lines.append(f"    {name:<17} {getattr(spec, name).cost}")
     return lines
+
+
+def one_sided_friction_that_absorbs(spec: ModuleSpec) -> list[str]:
+    """Base parameters of one-sided Coulomb friction that stand for a weight too: D_FSP - D_FSN = 1 in motion, 0 at rest."""
+    elements = element_names(spec.robot)
+    return [b.name for b in spec.regrouping.base if b.name != b.own and b.own in elements and elements[b.own][0].when]
 
 
 def frame_table(robot: Robot) -> list[str]:

@@ -89,6 +89,7 @@ def test_module_against_oracle(robot: Robot, oracle, tmp_path: Path) -> None:
     close(module.frame_poses(q), model.poses(q))
     for frame in robot.frames:
         close(module.jacobian(q, frame=frame.j), model.jacobian(q, frame.j))
+    assert friction_absorbs(module) == ("In motion only" in (module.__doc__ or ""))
     if not friction_absorbs(module):
         close(module.gravity(q, X), model.gravity(q, chi))
     A = model.inertia_matrix(q, chi)
