@@ -33,11 +33,3 @@ class ExpressionError(SymgenError):
         self.text, self.column = text, column
         place = "" if column is None else f" at column {column}"
         super().__init__(f"{message}{place} in {text[:80]!r}")
-
-
-class CertificateError(SymgenError):
-    """A regrouping that its certificate refuses; `failures` lists what did not hold."""
-
-    def __init__(self, message: str, failures: tuple[str, ...] = ()) -> None:
-        self.failures = failures
-        super().__init__(message)

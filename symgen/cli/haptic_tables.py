@@ -17,8 +17,7 @@ TABLE_6 = dict(zip(NAMES, (  # column LS Identified Value; the column CESTAC rep
 TABLE_6_CAD = dict(zip(NAMES, (  # * identified by specific tests
     "0.050", "0.025", "0.12*", "-0.023", "0.03", "-0.02", "0.11*", "0.03", "-0.012", "0.014", "0.04", "0.07", "0.11*", "0.03",
 ), strict=True))  # fmt: skip
-COUNTS = (4000, 100, 80)  # Delta = 2 pi / counts, of the motor
-TABLE_7 = dict(zip(NAMES, (  # %e
+TABLE_7 = dict(zip(NAMES, (  # %e at Delta = 2 pi/4000, 2 pi/100, 2 pi/80 of the motor
     ("<1", "1", "4"), ("<1", "2", "6"), ("<1", "<1", "1"), ("<1", "2", "5"), ("<1", "1", "4"), ("<1", "3", "6"), ("<1", "<1", "<1"),
     ("<1", "<1", "5"), ("<1", "2", "5"), ("<1", "<1", "<1"), ("<1", "<1", "2"), ("<1", "<1", "2"), ("<1", "<1", "<1"), ("<1", "<1", "<1"),
 ), strict=True))  # fmt: skip

@@ -187,9 +187,3 @@ def reachable(outputs: Iterable[Scalar | int]) -> list[Node]:
         found.append(node)
         stack.extend(x.node for x in node.operands)
     return sorted(found, key=lambda n: n.index)
-
-
-def count_operations(outputs: Iterable[Scalar | int]) -> tuple[int, int]:
-    """(multiplications, additions) per sample: operations on constants and parameters alone happen once per call."""
-    nodes = [n for n in reachable(outputs) if not n.fixed]
-    return sum(n.op == MUL for n in nodes), sum(n.op == ADD for n in nodes)

@@ -69,10 +69,6 @@ class Algebra(Protocol):
         ...
 
 
-def neg(a: Scalar) -> Scalar:
-    return -a
-
-
 def add(a: Scalar, b: Scalar) -> Scalar:
     if type(a) is int and a == 0:
         return b

@@ -13,6 +13,7 @@ import numpy as np
 from symgen.derive.exact import Array, Draw, Fp, power
 from symgen.derive.graph import CONST, COS, INV, POS, SIGN, SIN, SQRT, Graph, Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.description.expression import Expression
 
 SAMPLES = 3
 
@@ -20,12 +21,12 @@ SAMPLES = 3
 class Program:
     """A graph without repeated values: `outputs` correspond to those given, `sections` to those of the algebra."""
 
-    def __init__(self, algebra: GraphAlgebra, outputs: Sequence[Scalar | int], parameters: Sequence[str] = ()) -> None:
+    def __init__(self, algebra: GraphAlgebra, outputs: Sequence[Scalar | int]) -> None:
         self.algebra, self.graph = algebra, Graph()
         self.draw = Draw(algebra.robot, 7, SAMPLES)
         self.p = self.draw.p
         rng = np.random.default_rng(5)
-        self._parameter = {name: rng.integers(1, self.p, 1) for name in parameters}
+        self._rate: dict[str, Array] = {}  # of tied joints, by name
         self._direction: dict[int, Array] = {}
         self._rng = rng
         self.value: dict[int, Array] = {}  # of the nodes of self.graph
@@ -135,13 +136,11 @@ class Program:
         return step if of_sign else step * self._operand(x) % self.p
 
     def _symbol(self, name: str) -> Array:
-        if name in self._parameter:
-            return self._parameter[name]
         if name in self.algebra.robot.constants:
-            return self.draw._constants[name]
+            return np.asarray(self.draw.constant(Expression.symbol(name)).x)
         if name == "pi":
             return self._rng.integers(1, self.p, 1)
         if name.startswith("G"):  # rate of a tied joint
-            return self._parameter.setdefault(name, self._rng.integers(1, self.p, SAMPLES))
+            return self._rate.setdefault(name, self._rng.integers(1, self.p, SAMPLES))
         kind, j = name.rstrip("0123456789"), int(name[len(name.rstrip("0123456789")) :])
         return {"q": self.draw.q, "QP": self.draw.qd, "QDP": self.draw.qdd}[kind](j).x
