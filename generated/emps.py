@@ -56,6 +56,11 @@ VALUES = {
     'XX1': 0.0, 'XY1': 0.0, 'XZ1': 0.0, 'YY1': 0.0, 'YZ1': 0.0, 'ZZ1': 0.0, 'MX1': 0.0, 'MY1': 0.0, 'MZ1': 0.0,
     'M1': 95.1089, 'Ia1': 0.0, 'FV1': 203.5034, 'FS1': 20.3935, 'OFFSET1': -3.1648,
 }
+LINKS = (1,)
+ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
+    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+    'OFFSET1': ('offset', 'both', {1: 1.0}),
+}
 _PATHS = {1: ((1, 1, ((0, 1.0),)),)}
 
 

@@ -57,6 +57,12 @@ VALUES = {
     'XX1': 0.0, 'XY1': 0.0, 'XZ1': 0.0, 'YY1': 0.0, 'YZ1': 0.0, 'ZZ1': 0.0, 'MX1': 0.0, 'MY1': 0.0, 'MZ1': 0.0,
     'M1': 95.154, 'Ia1': 0.0, 'FVP1': 166.7061, 'FSP1': 20.144, 'FVN1': 240.4236, 'FSN1': 20.6277,
 }
+LINKS = (1,)
+ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
+    'Ia1': ('inertia', 'both', {1: 1.0}), 'FVP1': ('viscous', 'positive', {1: 1.0}),
+    'FSP1': ('coulomb', 'positive', {1: 1.0}), 'FVN1': ('viscous', 'negative', {1: 1.0}),
+    'FSN1': ('coulomb', 'negative', {1: 1.0}),
+}
 _PATHS = {1: ((1, 1, ((0, 1.0),)),)}
 
 

@@ -81,6 +81,12 @@ STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whet
 DRIVES = None
 LIMITS = {}
 VALUES = {}
+LINKS = (1, 2, 3, 4)
+ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
+    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}), 'FV3': ('viscous', 'both', {3: 1.0}),
+    'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
+}
 _PATHS = {
     1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),))), 3: ((3, 0, ((1, 1.0),)),),
     4: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))),

@@ -128,6 +128,16 @@ VALUES = {
     'ZZ6': 0.0005365, 'MX6': 0.0029582, 'MY6': 1e-05, 'MZ6': -7.18e-05, 'M6': 0.0388, 'FVP2': 2e-05, 'FVP5': 2e-05,
     'FSP2': 0.02, 'FSP5': 0.02,
 }
+LINKS = (1, 2, 3, 4, 5, 6)
+ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
+    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}),
+    'FS4': ('coulomb', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
+    'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}),
+    'FVP2': ('viscous', 'both', {2: 1.0}), 'FVP5': ('viscous', 'both', {5: 1.0}), 'FSP2': ('coulomb', 'both', {2: 1.0}),
+    'FSP5': ('coulomb', 'both', {5: 1.0}),
+}
 _PATHS = {
     1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
     3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0)))),

@@ -66,6 +66,12 @@ VALUES = {
     'YY2': 0.1673, 'YZ2': 0.0, 'ZZ2': 0.1673, 'MX2': 0.5, 'MY2': 0.0, 'MZ2': 0.0, 'M2': 2.0, 'Ia2': 0.02, 'FV2': 0.3,
     'FS2': 0.4, 'OFFSET2': -0.05,
 }
+LINKS = (1, 2)
+ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
+    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}),
+}
 _PATHS = {1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)))}
 
 

@@ -102,6 +102,17 @@ STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whet
 DRIVES = None
 LIMITS = {}
 VALUES = {}
+LINKS = (1, 2, 3, 4, 5, 6)
+ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
+    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
+    'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
+    'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
+    'OFFSET4': ('offset', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
+    'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}),
+    'FV6': ('viscous', 'both', {6: 1.0}), 'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}),
+}
 _PATHS = {
     1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
     3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),))),

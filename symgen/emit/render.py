@@ -13,6 +13,7 @@ from symgen.derive.loops import close
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.c_target import ABI, c_spec, layout
 from symgen.emit.header import header, literal, packed, tables
+from symgen.emit.physical import physical_tables
 from symgen.emit.printers import Section
 from symgen.emit.spec import WIDTH, ModuleSpec
 from symgen.regroup.regrouping import formula
@@ -76,7 +77,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         "joint": robot.joints[0],
         "passive": bool(robot.passive),
         "passive_rows": _passive_rows(robot),
-        "tables": [*tables(spec), *_paths(robot)],
+        "tables": [*tables(spec), *physical_tables(robot), *_paths(robot)],
         "constant_entries": spec.constant_entries,
         "constants": "".join(f", {name}" for name in constants),
         "passed": "".join(f", {name}={name}" for name in constants),
