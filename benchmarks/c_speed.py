@@ -22,7 +22,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from runtime import GeneratedModel, load_model
-from runtime.studies.compiled import FallbackWarning, compiled_model, compiler
+from runtime.studies.compile_cache import FallbackWarning, compiler
+from runtime.studies.compiled import compiled_model
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

@@ -2,9 +2,7 @@
 
     model = compiled_model(load_model("tx40"))          # generated/tx40.c beside generated/tx40.py
 
-The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder (`SYMGEN_CACHE`, else that of the platform). Its name
-holds the SHA-256 of source, flags, compiler and processor, and that of its own bytes, so that a damaged file is seen before it is loaded; it is
-written under another name and moved, so that processes may compile at once. One tile of every function is compared with NumPy.
+The object lies in a cache that is checked (`runtime.studies.compile_cache`). One tile of every function is compared with NumPy.
 
 A C file runs as it is, unlike a module (`runtime.model_source`): compile only what you emitted yourself.
 """
@@ -12,31 +10,21 @@ A C file runs as it is, unlike a module (`runtime.model_source`): compile only w
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import os
-import platform
-import shlex
-import shutil
-import subprocess
-import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Protocol, cast
 
 import numpy as np
 
 from runtime.errors import InputError
 from runtime.model import GeneratedModel
+from runtime.studies.compile_cache import FallbackWarning, NotCompiledError, cache_folder, shared_object
 
 Array = np.ndarray
 
 ABI = 1
-FLAGS = ("-std=c11", "-O2", "-ftree-vectorize", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-shared", "-fPIC")
-LIBRARIES = ("-lm",)
-UNSAFE = ("-ffast-math", "-Ofast", "-funsafe-math-optimizations")  # set flush-to-zero in the process that loads the object
-TIME = 120.0  # s, of one compilation
 TOLERANCE = 1e-10  # of the largest entry: the self-check looks for wrong code, not for rounding
 STATES = {
     "regressor": ("q", "qd", "qdd"),
@@ -45,14 +33,6 @@ STATES = {
     "bias": ("q", "qd"),
     "gravity": ("q",),
 }
-
-
-class FallbackWarning(UserWarning):
-    """The NumPy module is used in place of C; the message says why."""
-
-
-class _NotCompiledError(Exception):
-    """Why there is no C."""
 
 
 class DynamicModel(GeneratedModel, Protocol):
@@ -71,24 +51,13 @@ def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: 
     """
     try:
         path = source or _beside(model)
-        library = _loaded(path, _text(path), cache or cache_folder(), model)
+        library = shared_object(path, _text(path), cache or cache_folder(), lambda found: _opened(found, model))
         compiled = CompiledModel(cast(DynamicModel, model), library)
         compiled.check()
         return cast(GeneratedModel, compiled)
-    except (_NotCompiledError, OSError) as e:
+    except (NotCompiledError, OSError) as e:
         warnings.warn(f"{model.NAME}: NumPy in place of C: {e}", FallbackWarning, stacklevel=2)
         return model
-
-
-def cache_folder() -> Path:
-    """SYMGEN_CACHE, or the folder of the platform for files that can be made again."""
-    if given := os.environ.get("SYMGEN_CACHE"):
-        return Path(given)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "symgen" / "compiled"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "symgen" / "compiled"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symgen" / "compiled"
 
 
 class CompiledModel:
@@ -143,7 +112,7 @@ class CompiledModel:
             arguments = [*states[: len(used)], *([] if name == "regressor" else [X])]
             found, expected = (getattr(m, name)(*arguments) for m in (self, self._model))
             if not np.abs(found - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
-                raise _NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
+                raise NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
 
     def _filled_store(self, q: Array, qd: Array, qdd: Array, out: Array | None, constants: Mapping[str, float]) -> Array:
         states = self._states("regressor", (q, qd, qdd))
@@ -205,51 +174,16 @@ def _third_of_last_cache() -> int:
 def _beside(model: GeneratedModel) -> Path:
     file = getattr(model, "__file__", None)
     if file is None:
-        raise _NotCompiledError("the model was not loaded from a file, and no C file is given")
+        raise NotCompiledError("the model was not loaded from a file, and no C file is given")
     return Path(file).with_suffix(".c")
 
 
 def _text(path: Path) -> bytes:
     if not path.is_file():
-        raise _NotCompiledError(
+        raise NotCompiledError(
             f"there is no {path}; `symgen generate {path.stem} --target numpy,c` writes it, except where loops need iteration"
         )
     return path.read_bytes()
-
-
-def _loaded(path: Path, text: bytes, folder: Path, model: GeneratedModel) -> ctypes.CDLL:
-    """The shared object of a C file, from the cache or compiled; one that does not load is compiled again, once."""
-    command, version = compiler()
-    parts = (text, " ".join((*FLAGS, *LIBRARIES)).encode(), " ".join(command).encode(), version.encode(), _processor().encode())
-    key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    if os.name == "posix" and folder.stat().st_mode & 0o002:
-        raise _NotCompiledError(f"anyone may write to the cache folder {folder}; choose another by SYMGEN_CACHE")
-    for found in sorted(folder.glob(f"{key[:32]}-*.so")):
-        if hashlib.sha256(found.read_bytes()).hexdigest()[:32] == found.stem.partition("-")[2]:
-            try:
-                return _opened(found, model)
-            except (_NotCompiledError, OSError):
-                pass
-        found.unlink(missing_ok=True)
-    return _opened(_compiled(command, path, text, folder, key[:32]), model)
-
-
-def _compiled(command: Sequence[str], path: Path, text: bytes, folder: Path, key: str) -> Path:
-    with TemporaryDirectory(dir=folder, prefix=".compiling-") as scratch:
-        source, target = Path(scratch) / path.name, Path(scratch) / f"{path.stem}.so"
-        source.write_bytes(text)
-        line = [*command, *FLAGS, source.name, "-o", target.name, *LIBRARIES]
-        try:
-            done = subprocess.run(line, cwd=scratch, capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
-        except (OSError, subprocess.TimeoutExpired) as e:
-            raise _NotCompiledError(f"{' '.join(command)} did not run: {e}") from e
-        if done.returncode or not target.is_file():
-            first = next(iter(done.stderr.strip().splitlines()), "no message")
-            raise _NotCompiledError(f"{' '.join(command)} failed with {done.returncode}: {first}")
-        final = folder / f"{key}-{hashlib.sha256(target.read_bytes()).hexdigest()[:32]}.so"
-        target.replace(final)
-    return final
 
 
 def _opened(path: Path, model: GeneratedModel) -> ctypes.CDLL:
@@ -260,35 +194,10 @@ def _opened(path: Path, model: GeneratedModel) -> ctypes.CDLL:
         for name in STATES:
             getattr(library, f"{model.NAME}_{name}").restype = ctypes.c_int32
     except AttributeError as e:
-        raise _NotCompiledError(f"the C file is not that of {model.NAME}: {e}") from e
+        raise NotCompiledError(f"the C file is not that of {model.NAME}: {e}") from e
     sha256.restype, abi.restype = ctypes.c_char_p, ctypes.c_int32
     if abi() != ABI:
-        raise _NotCompiledError(f"the C file has interface {abi()}, expected {ABI}; emit it again")
+        raise NotCompiledError(f"the C file has interface {abi()}, expected {ABI}; emit it again")
     if sha256().decode() != model.SOURCE_SHA256:
-        raise _NotCompiledError("C file and module stem from different robot files; emit both again")
+        raise NotCompiledError("C file and module stem from different robot files; emit both again")
     return library
-
-
-def compiler() -> tuple[tuple[str, ...], str]:
-    """Command of the C compiler and what it says of its version; raises where there is none."""
-    given = shlex.split(os.environ.get("CC", ""))
-    program = shutil.which(given[0]) if given else next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-    if program is None:
-        raise _NotCompiledError(f"no C compiler {given[0]} (CC)" if given else "no C compiler cc, gcc or clang on PATH")
-    unsafe = [flag for flag in given[1:] if flag in UNSAFE]
-    if unsafe:
-        raise _NotCompiledError(f"CC holds {', '.join(unsafe)}, which changes the arithmetic of the whole process")
-    command = (program, *given[1:])
-    try:
-        done = subprocess.run([*command, "--version"], capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
-    except (OSError, subprocess.TimeoutExpired) as e:
-        raise _NotCompiledError(f"{program} did not run: {e}") from e
-    return command, done.stdout
-
-
-def _processor() -> str:
-    """What the code may depend on: machine, system, processor flags."""
-    info = Path("/proc/cpuinfo")
-    text = info.read_text(errors="replace") if info.is_file() else platform.processor()
-    flags = next((line for line in text.splitlines() if line.startswith(("flags", "Features"))), "")
-    return f"{platform.system()} {platform.machine()} {platform.architecture()[0]} {flags}"

@@ -1,0 +1,107 @@
+"""C files compiled on first use into a cache that is checked.
+
+The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder (`SYMGEN_CACHE`, else that of the platform). Its name
+holds the SHA-256 of source, flags, compiler and processor, and that of its own bytes, so that a damaged file is seen before it is loaded; it is
+written under another name and moved, so that processes may compile at once.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+FLAGS = ("-std=c11", "-O2", "-ftree-vectorize", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-shared", "-fPIC")
+LIBRARIES = ("-lm",)
+UNSAFE = ("-ffast-math", "-Ofast", "-funsafe-math-optimizations")  # set flush-to-zero in the process that loads the object
+TIME = 120.0  # s, of one compilation
+
+
+class FallbackWarning(UserWarning):
+    """NumPy is used in place of C; the message says why."""
+
+
+class NotCompiledError(Exception):
+    """Why there is no C."""
+
+
+def cache_folder() -> Path:
+    """SYMGEN_CACHE, or the folder of the platform for files that can be made again."""
+    if given := os.environ.get("SYMGEN_CACHE"):
+        return Path(given)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "symgen" / "compiled"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "symgen" / "compiled"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symgen" / "compiled"
+
+
+def shared_object(path: Path, text: bytes, folder: Path, opened: Callable[[Path], ctypes.CDLL]) -> ctypes.CDLL:
+    """The shared object of a C file, from the cache or compiled; one that does not open is compiled again, once.
+
+    text : what the file holds.   opened : loads and checks an object; raises NotCompiledError or OSError where it is not the one wanted.
+    """
+    command, version = compiler()
+    parts = (text, " ".join((*FLAGS, *LIBRARIES)).encode(), " ".join(command).encode(), version.encode(), _processor().encode())
+    key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if os.name == "posix" and folder.stat().st_mode & 0o002:
+        raise NotCompiledError(f"anyone may write to the cache folder {folder}; choose another by SYMGEN_CACHE")
+    for found in sorted(folder.glob(f"{key[:32]}-*.so")):
+        if hashlib.sha256(found.read_bytes()).hexdigest()[:32] == found.stem.partition("-")[2]:
+            try:
+                return opened(found)
+            except (NotCompiledError, OSError):
+                pass
+        found.unlink(missing_ok=True)
+    return opened(_compiled(command, path, text, folder, key[:32]))
+
+
+def _compiled(command: Sequence[str], path: Path, text: bytes, folder: Path, key: str) -> Path:
+    with TemporaryDirectory(dir=folder, prefix=".compiling-") as scratch:
+        source, target = Path(scratch) / path.name, Path(scratch) / f"{path.stem}.so"
+        source.write_bytes(text)
+        line = [*command, *FLAGS, source.name, "-o", target.name, *LIBRARIES]
+        try:
+            done = subprocess.run(line, cwd=scratch, capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
+        except (OSError, subprocess.TimeoutExpired) as e:
+            raise NotCompiledError(f"{' '.join(command)} did not run: {e}") from e
+        if done.returncode or not target.is_file():
+            first = next(iter(done.stderr.strip().splitlines()), "no message")
+            raise NotCompiledError(f"{' '.join(command)} failed with {done.returncode}: {first}")
+        final = folder / f"{key}-{hashlib.sha256(target.read_bytes()).hexdigest()[:32]}.so"
+        target.replace(final)
+    return final
+
+
+def compiler() -> tuple[tuple[str, ...], str]:
+    """Command of the C compiler and what it says of its version; raises where there is none."""
+    given = shlex.split(os.environ.get("CC", ""))
+    program = shutil.which(given[0]) if given else next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    if program is None:
+        raise NotCompiledError(f"no C compiler {given[0]} (CC)" if given else "no C compiler cc, gcc or clang on PATH")
+    unsafe = [flag for flag in given[1:] if flag in UNSAFE]
+    if unsafe:
+        raise NotCompiledError(f"CC holds {', '.join(unsafe)}, which changes the arithmetic of the whole process")
+    command = (program, *given[1:])
+    try:
+        done = subprocess.run([*command, "--version"], capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
+    except (OSError, subprocess.TimeoutExpired) as e:
+        raise NotCompiledError(f"{program} did not run: {e}") from e
+    return command, done.stdout
+
+
+def _processor() -> str:
+    """What the code may depend on: machine, system, processor flags."""
+    info = Path("/proc/cpuinfo")
+    text = info.read_text(errors="replace") if info.is_file() else platform.processor()
+    flags = next((line for line in text.splitlines() if line.startswith(("flags", "Features"))), "")
+    return f"{platform.system()} {platform.machine()} {platform.architecture()[0]} {flags}"
