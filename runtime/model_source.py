@@ -1,8 +1,9 @@
 """Running an emitted file given by path: only if its syntax tree is one an emitter writes.
 
-Allowed at the top: a docstring, `import numpy as np`, assignments, functions and classes. Inside: no further import, no name with two leading
-underscores besides a few, no global state, and only names that the file defines itself, a short list of builtins and the numerical part of numpy.
-What is checked is what runs: the text is read once.
+Allowed at the top: a docstring, `import numpy as np` or `import casadi as ca`, assignments, functions and classes. Inside: no further import, no
+name with two leading underscores besides a few, no global state, and only names that the file defines itself, a short list of builtins and the
+numerical part of the one package it imports. CasADi functions can compile and run C, and write files: of them only the construction from
+expressions is allowed, with `default_in` as the one option. What is checked is what runs: the text is read once.
 """
 
 from __future__ import annotations
@@ -55,6 +56,11 @@ NUMPY = _words(
     "zeros zeros_like"
 )
 LINALG = frozenset({"LinAlgError", "cholesky", "cond", "det", "eigvalsh", "inv", "lstsq", "norm", "qr", "solve", "svd"})
+CASADI = _words("Function SX cos cross fmax fmin horzcat jacobian pi sign sin sqrt vertcat vertsplit")
+CASADI_ATTRIBUTES = frozenset(
+    {"T", "eye", "sym", "values"}
+)  # of anything else in a file that imports casadi: no save, generate, from_file ...
+PACKAGES = {"np": ("numpy", NUMPY), "ca": ("casadi", CASADI)}
 HIDDEN = (frozenset(dir(builtins)) - BUILTINS) | {"np"}  # open, eval, exec, getattr, vars ...: neither used nor redefined
 FILES = frozenset(
     {"tofile", "dump", "dumps", "ctypes", "ctypeslib", "format", "format_map"}
@@ -121,31 +127,39 @@ def check_source(text: str, file: str) -> None:
         raise ModelError(f"not Python: {e}", file=file) from None
     for statement in tree.body:
         _check_statement(statement, file)
+    aliases = {alias for statement in tree.body if (alias := _imported(statement))}
+    if len(aliases) > 1:
+        raise ModelError("imports numpy and casadi; an emitted model has one array package", file=file)
     own = _defined(tree)
-    shadowed = sorted(own & HIDDEN)
+    shadowed = sorted(own & (HIDDEN | aliases))
     if shadowed:
-        raise ModelError(f"defines {', '.join(shadowed)}, builtins that emitted models do not touch", file=file)
-    imports = {id(node) for node in tree.body if _is_numpy(node)}
+        raise ModelError(f"defines {', '.join(shadowed)}, names that emitted models do not touch", file=file)
+    imports = {id(node) for node in tree.body if _imported(node)}
     modules = {
         id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)
     }  # np and np.linalg only as np.name, np.linalg.name
     for part in ast.walk(tree):
         if id(part) not in imports:
-            _check_node(part, BUILTINS | own, file)
-        if _is_name(part, "np") and id(part) not in modules:
-            _refuse(part, "numpy itself is not passed on", file)
+            _check_node(part, BUILTINS | own | aliases, file)
+        if isinstance(part, ast.Name) and part.id in aliases and id(part) not in modules:
+            _refuse(part, f"{PACKAGES[part.id][0]} itself is not passed on", file)
         if _is_linalg(part) and id(part) not in modules:
             _refuse(part, "numpy.linalg itself is not passed on", file)
+    if "ca" in aliases:
+        _check_casadi(tree, file)
 
 
 def _check_statement(node: ast.stmt, file: str) -> None:
     text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-    if not (text or _is_numpy(node) or isinstance(node, ast.Assign | ast.AnnAssign | ast.FunctionDef | ast.ClassDef)):
-        _refuse(node, "expected a docstring, `import numpy as np`, an assignment, a function or a class", file)
+    if not (text or _imported(node) or isinstance(node, ast.Assign | ast.AnnAssign | ast.FunctionDef | ast.ClassDef)):
+        _refuse(node, "expected a docstring, `import numpy as np` or `import casadi as ca`, an assignment, a function or a class", file)
 
 
-def _is_numpy(node: ast.AST) -> bool:
-    return isinstance(node, ast.Import) and [(a.name, a.asname) for a in node.names] == [("numpy", "np")]
+def _imported(node: ast.AST) -> str | None:
+    """Alias of the array package that the statement imports."""
+    if not isinstance(node, ast.Import):
+        return None
+    return next((alias for alias, (name, _) in PACKAGES.items() if [(a.name, a.asname) for a in node.names] == [(name, alias)]), None)
 
 
 def _is_name(node: ast.AST, name: str) -> bool:
@@ -154,6 +168,28 @@ def _is_name(node: ast.AST, name: str) -> bool:
 
 def _is_linalg(node: ast.AST) -> bool:
     return isinstance(node, ast.Attribute) and node.attr == "linalg" and _is_name(node.value, "np")
+
+
+def _check_casadi(tree: ast.Module, file: str) -> None:
+    """Functions are built from expressions and called; nothing is loaded, saved, compiled or given options that do so."""
+    called = {id(node.func): node for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Attribute):
+            continue
+        if not _is_name(node.value, "ca") and node.attr not in CASADI_ATTRIBUTES:
+            _refuse(node, "an attribute that emitted CasADi models do not use", file)
+        if _is_name(node.value, "ca") and node.attr in ("Function", "jacobian"):
+            call = called.get(id(node))
+            if call is None or call.keywords or any(isinstance(x, ast.Starred) for x in call.args):
+                _refuse(node, "called with plain arguments only", file)
+            elif node.attr == "jacobian" and len(call.args) != 2:
+                _refuse(call, "expected an expression and a variable, no options", file)
+            elif node.attr == "Function" and not (len(call.args) == 6 and _is_defaults(call.args[5])):
+                _refuse(call, "expected name, inputs, results, their names, and default_in as the one option", file)
+
+
+def _is_defaults(node: ast.expr) -> bool:
+    return isinstance(node, ast.Dict) and [k.value if isinstance(k, ast.Constant) else None for k in node.keys] == ["default_in"]
 
 
 def _defined(tree: ast.Module) -> set[str]:
@@ -175,11 +211,12 @@ def _check_node(node: ast.AST, known: set[str] | frozenset[str], file: str) -> N
     if isinstance(node, REFUSED):
         _refuse(node, "an emitted model has no such statement", file)
     elif isinstance(node, ast.Name):
-        if (node.id not in known and node.id not in DUNDERS and node.id != "np") or (node.id.startswith("__") and node.id not in DUNDERS):
-            _refuse(node, "a name the file does not define; allowed are its own names, numpy and a few builtins", file)
+        if (node.id not in known and node.id not in DUNDERS) or (node.id.startswith("__") and node.id not in DUNDERS):
+            _refuse(node, "a name the file does not define; allowed are its own names, its array package and a few builtins", file)
     elif isinstance(node, ast.Attribute):
-        if (_is_name(node.value, "np") and node.attr not in NUMPY) or (_is_linalg(node.value) and node.attr not in LINALG):
-            _refuse(node, "not in the numerical part of numpy that emitted models use", file)
+        package = PACKAGES.get(node.value.id) if isinstance(node.value, ast.Name) else None
+        if (package and node.attr not in package[1]) or (_is_linalg(node.value) and node.attr not in LINALG):
+            _refuse(node, f"not in the numerical part of {package[0] if package else 'numpy'} that emitted models use", file)
         if (node.attr.startswith("__") and node.attr not in DUNDERS) or node.attr in FILES or node.attr.startswith(FRAMES):
             _refuse(node, "an attribute emitted models do not use", file)
     elif isinstance(node, ast.FunctionDef | ast.ClassDef):

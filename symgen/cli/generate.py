@@ -12,7 +12,7 @@ import typer
 from symgen.cli.session import NEGATIVE, fail, reported_errors
 from symgen.cli.writing import write_all
 
-TARGETS = ("numpy", "c")
+TARGETS = {"numpy": "{}.py", "casadi": "{}_casadi.py", "c": "{}.c"}
 
 
 def generate(
@@ -20,10 +20,10 @@ def generate(
         list[str], typer.Argument(metavar="ROBOT...", help="Packaged robots or robot files (.yaml); `all` for every packaged one.")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the modules.")] = Path("generated"),
-    target: Annotated[str, typer.Option(help="What to emit: numpy, c, or both as numpy,c.")] = "numpy",
+    target: Annotated[str, typer.Option(help="What to emit: numpy, casadi, c, or several as numpy,c.")] = "numpy",
     check: Annotated[bool, typer.Option("--check", help="Write nothing; fail with a diff where a module is not current.")] = False,
 ) -> None:
-    """Derive the models of each ROBOT and write them as OUTPUT/<name>.py, or .c for C. All are written, or none."""
+    """Derive the models of each ROBOT and write them as OUTPUT/<name>.py, _casadi.py for CasADi, .c for C. All are written, or none."""
     with reported_errors():
         targets = tuple(dict.fromkeys(part.strip() for part in target.split(",")))
         if unknown := [part for part in targets if part not in TARGETS]:
@@ -48,8 +48,8 @@ def emitted(robots: list[str], targets: Sequence[str] = ("numpy",)) -> dict[str,
         files = generate_files(robot, targets=targets, command=command)
         if modules.keys() & files.keys():
             fail(f"two robots are called {robot.name}; their modules would overwrite each other")
-        if "c" in targets and f"{robot.name}.c" not in files:
-            typer.echo(f"{robot.name}: no C, its loops are closed by iteration; the NumPy module serves", err=True)
+        for left_out in (t for t in targets if TARGETS[t].format(robot.name) not in files):
+            typer.echo(f"{robot.name}: no {left_out} target, its loops are closed by iteration; the NumPy module serves", err=True)
         modules |= files
     return modules
 

@@ -121,8 +121,8 @@ def _form_text(form: Mapping[tuple[int, int], Any]) -> str:
     return " + ".join(parts)
 
 
-def tables(spec: ModuleSpec) -> list[str]:
-    """The constants of the module, as Python source."""
+def tables(spec: ModuleSpec, *, numpy: bool = True) -> list[str]:
+    """The constants of the module, as Python source; STRUCTURE as an array where the module has `numpy`, else as a tuple of rows."""
     robot, regrouping = spec.robot, spec.regrouping
     return [
         f"SCHEMA = {1!r}",
@@ -136,9 +136,7 @@ def tables(spec: ModuleSpec) -> list[str]:
         *literal("UNITS", {b.name: unit(robot, b.own) for b in regrouping.base}),
         *literal("FORMULAS", {b.name: b.formula for b in regrouping.base}),
         *literal("NO_EFFECT", regrouping.no_effect),
-        'STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j',
-        *(f"    {line}" for line in _marks(spec)),
-        ")])",
+        *_structure(spec, numpy),
         *_drives(robot),
         *literal("LIMITS", dict(robot.limits)),
         *literal("VALUES", dict(robot.values)),
@@ -161,9 +159,15 @@ def _drives(robot: Robot) -> list[str]:
     ]
 
 
-def _marks(spec: ModuleSpec) -> list[str]:
+def _structure(spec: ModuleSpec, numpy: bool) -> list[str]:
+    marks = 'mark == "x" for mark in row'
+    first, last = (f"np.array([[{marks}] for row in (", ")])") if numpy else (f"tuple(tuple({marks}) for row in (", "))")
     rows = ['"' + "".join("x" if mark else "." for mark in row) + '",' for row in spec.structure]
-    return wrap(" ".join(rows), WIDTH - 4, break_long_words=False)
+    return [
+        f"STRUCTURE = {first}  # [k, j]: whether base parameter k acts on joint j",
+        *(f"    {line}" for line in wrap(" ".join(rows), WIDTH - 4, break_long_words=False)),
+        last,
+    ]
 
 
 def literal(name: str, value: Any) -> list[str]:

@@ -11,7 +11,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from symgen.derive.loop_equations import loop_system
 from symgen.derive.loops import close
 from symgen.description.robot import FIXED, Robot
-from symgen.emit.c_target import ABI, c_spec, layout
+from symgen.emit.c_target import ABI, c_spec, layout, signals_layout
+from symgen.emit.casadi_target import blocks, check_labels, pose_labels
 from symgen.emit.header import header, literal, packed, tables
 from symgen.emit.physical import physical_tables
 from symgen.emit.printers import Section
@@ -49,46 +50,69 @@ def _environment() -> Environment:
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     """The NumPy module of `spec`. Same robot file, same version: same bytes."""
-    robot, regrouping = spec.robot, spec.regrouping
-    constants = list(robot.constants)
-    defaults = "".join(f", {name}={robot.constants[name]!r}" for name in constants)
-    closure = close(robot)
-    general = bool(closure.tied)
-    sizes = {
+    sizes, constants = _sizes(spec), list(spec.robot.constants)
+    defaults = "".join(f", {name}={spec.robot.constants[name]!r}" for name in constants)
+    context = {
+        **_context(spec, command),
+        "size": BLOCK,
+        "turn": loop_system(spec.robot).turn() if spec.tied else None,
+        "joint": spec.robot.joints[0],
+        "tables": [*tables(spec), *physical_tables(spec.robot), *_paths(spec.robot)],
+        "constant_entries": spec.constant_entries,
+        "passed": "".join(f", {name}={name}" for name in constants),
+        "defaults": defaults,
+        "keywords": ", *" + defaults if constants else "",
+        "blocks": [_block(name, spec, sizes, constants) for name in (*SUMMARIES, *(LOOP_SUMMARIES if spec.tied else ()))],
+    }
+    return _environment().get_template("module.py.jinja").render(context)
+
+
+def render_casadi(spec: ModuleSpec, *, command: str | None = None) -> str:
+    """The CasADi module of a `spec` printed by `CasadiText`. Same robot file, same version: same bytes."""
+    robot = spec.robot
+    check_labels(robot)
+    context = {
+        **_context(spec, command, package="ca"),
+        "tables": [*tables(spec, numpy=False), *_paths(robot)],
+        "example": "".join(f", {name}={value!r}" for name, value in list(robot.constants.items())[:1]),
+        "pose_labels": ", ".join(f'"{label}"' for label in pose_labels(robot)),
+        "blocks": blocks(spec),
+    }
+    return _environment().get_template("casadi.py.jinja").render(context)
+
+
+def _sizes(spec: ModuleSpec) -> dict[str, int]:
+    robot, closure = spec.robot, close(spec.robot)
+    return {
         "n": len(robot.joints),
         "m": len(closure.tied),
         "k": len(closure.independent),
-        "b": len(regrouping),
+        "b": len(spec.regrouping),
         "frames": len(robot.frames),
         "loops": sum(loop.cut in closure.tied for loop in robot.loops),
         "p": len(robot.parameters),
     }
-    context = {
-        **sizes,
+
+
+def _context(spec: ModuleSpec, command: str | None, *, package: str = "np") -> dict[str, object]:
+    """What Python modules of every array package share."""
+    robot = spec.robot
+    return {
+        **_sizes(spec),
         "title": plain(robot.title or robot.name),
         "file": plain(robot.file or robot.name),
         "sha256": robot.sha256,
         "version": VERSION,
         "command": plain(command or robot.file or robot.name),
-        "size": BLOCK,
         "header": [plain(line) for line in header(spec)],
-        "general": general,
-        "turn": loop_system(robot).turn() if general else None,
-        "joint": robot.joints[0],
+        "general": bool(spec.tied),
         "passive": bool(robot.passive),
-        "passive_rows": _passive_rows(robot),
-        "tables": [*tables(spec), *physical_tables(robot), *_paths(robot)],
-        "constant_entries": spec.constant_entries,
-        "constants": "".join(f", {name}" for name in constants),
-        "passed": "".join(f", {name}={name}" for name in constants),
-        "defaults": defaults,
-        "keywords": ", *" + defaults if constants else "",
+        "passive_rows": _passive_rows(robot, package),
+        "constants": "".join(f", {name}" for name in robot.constants),
         "unpack": _unpack(robot),
-        "formulas": _formulas(spec),
-        "packed": packed(list(regrouping.names)),
-        "blocks": [_block(name, spec, sizes, constants) for name in (*SUMMARIES, *(LOOP_SUMMARIES if general else ()))],
+        "formulas": [f"{b.name} = {_code(formula(b.combination), package)}" for b in spec.regrouping.base if b.name != b.own],
+        "packed": packed(list(spec.regrouping.names)),
     }
-    return _environment().get_template("module.py.jinja").render(context)
 
 
 def render_c(spec: ModuleSpec, *, command: str | None = None) -> str:
@@ -107,6 +131,7 @@ def render_c(spec: ModuleSpec, *, command: str | None = None) -> str:
         "n": c.joints,
         "tile": c.tile,
         "kernels": layout(c),
+        "signals": signals_layout(c),
         "helpers": {name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")},
     }
     return _environment().get_template("kernels.c.jinja").render(context)
@@ -137,14 +162,14 @@ def _block(name: str, spec: ModuleSpec, sizes: dict[str, int], constants: list[s
     }
 
 
-def _passive_rows(robot: Robot) -> dict[str, list[str]]:
+def _passive_rows(robot: Robot, package: str) -> dict[str, list[str]]:
     """The passive joints as rows over the independent ones: rates and constants, as source."""
     closure = close(robot)
     rows, offsets = [], []
     for j in robot.passive:
         row = closure.row[j]
-        rows.append("[" + ", ".join(_code(str(row[i])) if i in row else "0" for i in closure.independent) + "],")
-        offsets.append(_code(str(closure.offset[j])))
+        rows.append("[" + ", ".join(_code(str(row[i]), package) if i in row else "0" for i in closure.independent) + "],")
+        offsets.append(_code(str(closure.offset[j]), package))
     return {"rates": rows, "offsets": [f"[{', '.join(offsets)}]"]}
 
 
@@ -153,13 +178,9 @@ def _unpack(robot: Robot) -> list[str]:
     return ["(", *(f"    {line}" for line in wrap(text, WIDTH - 8)), ") = standard"]
 
 
-def _formulas(spec: ModuleSpec) -> list[str]:
-    return [f"{b.name} = {_code(formula(b.combination))}" for b in spec.regrouping.base if b.name != b.own]
-
-
-def _code(text: str) -> str:
-    """A formula of the common grammar as NumPy source."""
-    return re.sub(r"\b(cos|sin|sqrt)\(|\bpi\b", lambda match: f"np.{match.group(0)}", text)
+def _code(text: str, package: str) -> str:
+    """A formula of the common grammar as source of an array package."""
+    return re.sub(r"\b(cos|sin|sqrt)\(|\bpi\b", lambda match: f"{package}.{match.group(0)}", text)
 
 
 def _paths(robot: Robot) -> list[str]:

@@ -28,7 +28,7 @@ from symgen.regroup.regrouping import Regrouping
 WIDTH = 120
 STATES = {"q": "q", "qd": "QP", "qdd": "QDP"}
 Headings = list[tuple[int, str]]  # (index of the first node, title)
-LOCALS = ("D", "GAM", "A", "T", "X", "G", "R", "B", "np", "q", "qd", "qdd", "S", "out", "N")
+LOCALS = ("D", "GAM", "A", "T", "X", "G", "R", "B", "np", "ca", "q", "qd", "qdd", "S", "out", "N")
 
 
 @dataclass(frozen=True)
@@ -70,23 +70,23 @@ class ModuleSpec:
         return close(self.robot).tied
 
 
-def module_spec(regrouping: Regrouping) -> ModuleSpec:
-    """Derive every model of the module for the base parameters of `regrouping`."""
+def module_spec(regrouping: Regrouping, printer: type[Text] = Text) -> ModuleSpec:
+    """Derive every model of the module for the base parameters of `regrouping`, and print it in the language of `printer`."""
     robot = regrouping.robot
-    structure, constants, regressor = _regressor(regrouping)
+    structure, constants, regressor = _regressor(regrouping, printer)
     return ModuleSpec(
         robot=robot,
         regrouping=regrouping,
         structure=structure,
         constant_entries=constants,
         regressor=regressor,
-        inverse_dynamics=inverse_dynamics(regrouping),
-        inertia_matrix=_inertia_matrix(regrouping),
-        bias=_torques(regrouping, acceleration=False),
-        gravity=_torques(regrouping, acceleration=False, velocity=False),
-        frame_poses=_frame_poses(robot),
-        closure=_closure(robot) if close(robot).tied else None,
-        curvature=_curvature(robot) if close(robot).tied else None,
+        inverse_dynamics=_torques(regrouping, printer=printer),
+        inertia_matrix=_inertia_matrix(regrouping, printer),
+        bias=_torques(regrouping, acceleration=False, printer=printer),
+        gravity=_torques(regrouping, acceleration=False, velocity=False, printer=printer),
+        frame_poses=_frame_poses(robot, printer),
+        closure=_closure(robot, printer) if close(robot).tied else None,
+        curvature=_curvature(robot, printer) if close(robot).tied else None,
     )
 
 
@@ -100,12 +100,14 @@ def regressor_program(regrouping: Regrouping, own: Sequence[str]) -> tuple[list[
     return entries, Program(algebra, [D[own[k]][robot.joints[row]] for k, row in entries])
 
 
-def _regressor(regrouping: Regrouping) -> tuple[tuple[tuple[bool, ...], ...], tuple[tuple[int, int, float], ...], Function]:
+def _regressor(
+    regrouping: Regrouping, printer: type[Text]
+) -> tuple[tuple[tuple[bool, ...], ...], tuple[tuple[int, int, float], ...], Function]:
     robot = regrouping.robot
     entries, program = regressor_program(regrouping, regrouping.own)
     structure = [[False] * len(robot.joints) for _ in regrouping.base]
     constants: list[tuple[int, int, float]] = []
-    text = Text(program.outputs, program.sections, (*LOCALS, *robot.constants))
+    text = printer(program.outputs, program.sections, (*LOCALS, *robot.constants))
     lines: dict[int, list[str]] = {row: [] for row in range(len(robot.joints))}
     for (k, row), value in zip(entries, program.outputs, strict=True):
         if isinstance(value, int):
@@ -192,11 +194,16 @@ def torque_graph(
 
 
 def _torques(
-    regrouping: Regrouping, *, acceleration: bool = True, velocity: bool = True, only: Callable[[str], bool] = lambda own: True
+    regrouping: Regrouping,
+    *,
+    acceleration: bool = True,
+    velocity: bool = True,
+    only: Callable[[str], bool] = lambda own: True,
+    printer: type[Text] = Text,
 ) -> Function:
     robot = regrouping.robot
     outputs, headings = torque_graph(regrouping, acceleration=acceleration, velocity=velocity, only=only)
-    text = Text(outputs, headings, (*LOCALS, *robot.constants))
+    text = printer(outputs, headings, (*LOCALS, *robot.constants))
     results = [Section("Torques", tuple(f"GAM[{row}] = {text.expression(value)}" for row, value in enumerate(outputs)))]
     return _function(robot, text, results, regrouping.names)
 
@@ -214,10 +221,10 @@ def inertia_graph(regrouping: Regrouping) -> tuple[dict[tuple[int, int], Scalar 
     return entries, algebra.sections
 
 
-def _inertia_matrix(regrouping: Regrouping) -> Function:
+def _inertia_matrix(regrouping: Regrouping, printer: type[Text]) -> Function:
     robot = regrouping.robot
     entries, headings = inertia_graph(regrouping)
-    text = Text(list(entries.values()), headings, (*LOCALS, *robot.constants))
+    text = printer(list(entries.values()), headings, (*LOCALS, *robot.constants))
     lines = []
     for (j, i), value in entries.items():
         targets = f"A[{j}, {i}]" + (f" = A[{i}, {j}]" if i != j else "")
@@ -225,7 +232,7 @@ def _inertia_matrix(regrouping: Regrouping) -> Function:
     return _function(robot, text, [Section("Inertia matrix", tuple(lines))], regrouping.names)
 
 
-def _frame_poses(robot: Robot) -> Function:
+def _frame_poses(robot: Robot, printer: type[Text]) -> Function:
     algebra = GraphAlgebra(robot)
     pose = frame_poses(Geometry(robot, algebra, close(robot)))
     entries: list[tuple[str, Scalar | int]] = []
@@ -233,25 +240,27 @@ def _frame_poses(robot: Robot) -> Function:
         A, P = pose[f.j]
         entries += [(f"T[{row}, {k}, {m}]", A[k][m]) for k in range(3) for m in range(3)]
         entries += [(f"T[{row}, {k}, 3]", P[k]) for k in range(3)]
-    return _assignments(robot, algebra, entries, "Poses")
+    return _assignments(robot, algebra, entries, "Poses", printer)
 
 
-def _closure(robot: Robot) -> Function:
+def _closure(robot: Robot, printer: type[Text]) -> Function:
     algebra, system = GraphAlgebra(robot), loop_system(robot)
     entries = [(f"R[{k}, 0]", x) for k, x in enumerate(system.residual(algebra))]
     for k, row in enumerate(system.jacobian(algebra)):
         entries += [(f"R[{k}, {column}]", x) for column, x in enumerate(row, start=1)]
-    return _assignments(robot, algebra, entries, "Residuals and their derivatives by the joints")
+    return _assignments(robot, algebra, entries, "Residuals and their derivatives by the joints", printer)
 
 
-def _curvature(robot: Robot) -> Function:
+def _curvature(robot: Robot, printer: type[Text]) -> Function:
     algebra, system = GraphAlgebra(robot), loop_system(robot)
     values = [*system.curvature(algebra), *system.alignment(algebra)]
-    return _assignments(robot, algebra, [(f"B[{k}]", x) for k, x in enumerate(values)], "Second derivatives at constant rates")
+    return _assignments(robot, algebra, [(f"B[{k}]", x) for k, x in enumerate(values)], "Second derivatives at constant rates", printer)
 
 
-def _assignments(robot: Robot, algebra: GraphAlgebra, entries: Sequence[tuple[str, Scalar | int]], title: str) -> Function:
-    text = Text([value for _, value in entries], algebra.sections, (*LOCALS, *robot.constants))
+def _assignments(
+    robot: Robot, algebra: GraphAlgebra, entries: Sequence[tuple[str, Scalar | int]], title: str, printer: type[Text]
+) -> Function:
+    text = printer([value for _, value in entries], algebra.sections, (*LOCALS, *robot.constants))
     return _function(robot, text, [Section(title, tuple(f"{target} = {text.expression(value)}" for target, value in entries))])
 
 
