@@ -1,4 +1,4 @@
-"""Zero-phase decimation computed at the kept samples only, exactly.
+"""Zero-phase decimation computed at the kept samples only, exactly, of signals that may arrive in pieces.
 
 Reference: a Chebyshev I low-pass forward and backward in second-order sections with odd padding of p samples, then every n_d-th sample, which
 computes N outputs and throws all but N/n_d away. In modal form, lambda_i the poles of positive imaginary part and c_i their residues,
@@ -7,45 +7,46 @@ computes N outputs and throws all but N/n_d away. In modal form, lambda_i the po
     forward    x_(r+1) = lambda x_r + e_r,            f_r = D e_r + 2 Re c'x_r
     backward   w_(r-1) = lambda w_r + f_r,            y_r = D f_r + 2 Re c'w_r          (' transposes, products componentwise)
 
-with e the padded signal; both start in the steady state of their first value. Between kept samples r_k = phi + k n_d, with u_k the block of n_d samples from r_k on,
+with e the padded signal; both start in the steady state of their first value. Cut into blocks u_b of L = G n_d samples from the first kept sample
+phi on, with x_b the forward state at the first sample of block b and v_b the backward state w at its last one, everything is linear in blocks:
 
-    x_(k+1) = lambda^n_d x_k + P u_k                                                           k = 0 .. K-2
-    w_k     = lambda^n_d w_(k+1) + lambda^(n_d-1) f_(k+1) + Q u_k + Ma x_k + Mb conj(x_k)      k = K-2 .. 0
+    x_(b+1) = lambda^L x_b + P u_b          v_(b-1) = lambda^L v_b + Q u_b + Mx x_b          y_b = Y u_b + Yx x_b + Yv v_b
 
-One matrix product and two first-order recursions over K samples replace the serial filter over N. |lambda|^n_d is between 0.4 and 0.83 whatever n_d,
-so nothing grows; residues come from zeros and poles, polynomial coefficients would lose all digits at n_d = 100.
+[P; Q; Y] u is one matrix product for all signals and blocks, 2 (16 + G) operations a sample; x and v are K/G short steps. The start, and the samples
+behind the last whole block with their reflection, are products of their own: x_0 = X0 u, [v; y] = A u + Ax x. The signals are never stored.
+
+|lambda|^n_d is between 0.4 and 0.83 whatever n_d, so nothing grows; residues come from zeros and poles, polynomial coefficients would lose all
+digits at n_d = 100.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import toeplitz
-from scipy.signal import cheby1, lfilter
+from scipy.signal import cheby1
 
 Array = np.ndarray
 
 ORDER, RIPPLE, CUTOFF = 8, 0.05, 0.8  # of MATLAB's and scipy's decimate: ripple in dB, cut-off as a fraction of the new Nyquist frequency
-SMALL = 2**17  # multiplications of one matrix product
+LONGEST, MOST_KEPT = 320, 8  # samples and kept samples of a block; more: longer products, fewer steps; the time is flat around these
+PIECE = 4096  # samples of a signal treated at a time: rows of 32 kB, which stay in cache
 
 
 @dataclass(frozen=True, eq=False)
 class Operator:
     """Modal form of the filter for one factor n_d; m = 4 modes.
 
-    D : real.   c, lam : complex, shape (m,).   h : shape (n_d,), impulse response.   P, Q : complex, shape (m, n_d).   Ma, Mb : complex, shape (m, m).
+    D : real.   c, lam : complex, shape (m,).
     """
 
     factor: int
     D: float
     c: Array
     lam: Array
-    P: Array
-    Q: Array
-    Ma: Array
-    Mb: Array
 
     def impulse(self, length: int) -> Array:
         """h_0 ... h_(length-1)."""
@@ -59,15 +60,108 @@ def operator(factor: int) -> Operator:
     lam = poles[poles.imag > 0]
     others = np.array([[p for p in poles if p != pole] for pole in lam])
     c = D * np.prod(lam[:, None] - zeros, axis=1) / np.prod(lam[:, None] - others, axis=1)
-    j = np.arange(factor)
-    bare = Operator(factor, float(D), c, lam, *(np.empty(0),) * 4)
-    h = bare.impulse(factor)
-    tail = np.tril(toeplitz(h))[1:]  # tail[j-1, i] = h_(j-i), j = 1 .. n_d - 1
-    Q = lam[:, None] ** j[:-1] @ tail
-    direct, mirror = lam[:, None] * lam, lam[:, None] * lam.conj()
-    Ma = c * lam * (1 - direct ** (factor - 1)) / (1 - direct)
-    Mb = (c * lam).conj() * (1 - mirror ** (factor - 1)) / (1 - mirror)
-    return Operator(factor, float(D), c, lam, lam[:, None] ** j[::-1], Q, Ma, Mb)
+    return Operator(factor, float(D), c, lam)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What does not depend on the signals, for N samples of which K are kept. Complex numbers are pairs Re, Im, 2 m of them.
+
+    factor, phase : n_d, phi.   L, G, blocks : samples of a block, its kept samples, number of blocks.
+    step : lambda^L, complex, shape (m,).   PQY : shape (L, 4 m + G).   Mx : shape (2 m, 2 m).   Yx, Yv : shape (2 m, G).
+    X0 : shape (T0, 2 m).   A : shape (T, 2 m + G'), Ax : shape (2 m, 2 m + G'), G' kept samples at the end.
+    """
+
+    factor: int
+    phase: int
+    N: int
+    K: int
+    L: int
+    G: int
+    blocks: int
+    step: Array
+    PQY: Array
+    Mx: Array
+    Yx: Array
+    Yv: Array
+    X0: Array
+    A: Array
+    Ax: Array
+
+    def pieces(self, samples: int = PIECE) -> list[tuple[int, int]]:
+        """How signals must be cut: pieces [t0, t1) of about `samples` samples, of whole blocks but for the first and the last."""
+        length = max(1, samples // self.L) * self.L
+        cuts = [0, *range(self.phase + length, self.N, length), self.N]
+        return list(pairwise(cuts))
+
+
+@lru_cache(maxsize=32)
+def plan(N: int, factor: int, phase: int, pad: int) -> Plan:
+    """The plan for N > pad samples; factor from 2 on, phase : first kept sample, 0 to factor - 1, pad : p."""
+    op = operator(factor)
+    K = len(range(phase, N, factor))
+    G = max(1, min(MOST_KEPT, LONGEST // factor))
+    L, blocks = G * factor, (K - 1) // G
+    f_u, f_x = _forward(op, L)
+    v_f, y_f = _backward(op, L, G)
+    P = op.lam[:, None] ** np.arange(L)[::-1]
+    A, Ax = _end(op, N - phase - blocks * L, K - blocks * G, pad)
+    return Plan(
+        factor=factor,
+        phase=phase,
+        N=N,
+        K=K,
+        L=L,
+        G=G,
+        blocks=blocks,
+        step=op.lam**L,
+        PQY=_transposed(_pairs(P), _pairs(v_f @ f_u), y_f @ f_u),
+        Mx=_transposed(_pairs(v_f @ f_x)),
+        Yx=_transposed(y_f @ f_x),
+        Yv=_transposed(_output(op, op.lam[:, None] ** (L - 1 - factor * np.arange(G)))),
+        X0=_start(op, phase, pad),
+        A=A,
+        Ax=Ax,
+    )
+
+
+class Decimation:
+    """The decimation of S signals by one plan: `take` every piece of the plan, then `result`. Room is reused from one decimation to the next."""
+
+    def __init__(self, plan: Plan, S: int) -> None:
+        self.plan, m2 = plan, len(plan.Mx)
+        self.products = np.empty((plan.blocks, S, plan.PQY.shape[1]))
+        self.first, self.last = np.empty((S, len(plan.X0))), np.empty((S, len(plan.A)))
+        self.x, self.v = np.empty((plan.blocks + 1, S, m2)), np.empty((plan.blocks, S, m2))
+
+    def take(self, u: Array, t0: int) -> None:
+        """The samples t0, t0 + 1, ... of every signal, shape (S, B): one of the pieces of the plan."""
+        p, t1 = self.plan, t0 + u.shape[1]
+        start = max(t0, p.phase)
+        b0, b1 = (start - p.phase) // p.L, min(p.blocks, (t1 - p.phase) // p.L)
+        if b1 > b0:
+            blocks = u[:, start - t0 : start - t0 + (b1 - b0) * p.L].reshape(-1, p.L)
+            self.products[b0:b1] = (blocks @ p.PQY).reshape(len(u), b1 - b0, -1).swapaxes(0, 1)
+        _copy(u, t0, self.first, 0)
+        _copy(u, t0, self.last, p.N - self.last.shape[1])
+
+    def result(self) -> Array:
+        """The kept samples, shape (S, K)."""
+        p, x, v = self.plan, self.x, self.v
+        (blocks, S, m2), K = v.shape, p.blocks * p.G
+        x[0] = self.first @ p.X0
+        _recursion(p.step, x, self.products[..., :m2])
+        end = self.last @ p.A + x[-1] @ p.Ax
+        y = np.empty((S, p.K))
+        y[:, K:] = end[:, m2:]
+        if blocks:
+            v[-1] = end[:, :m2]
+            states = x[:-1].reshape(-1, m2)
+            drive = self.products[..., m2 : 2 * m2] + (states @ p.Mx).reshape(v.shape)
+            _recursion(p.step, v[::-1], drive[:0:-1])
+            outputs = self.products[..., 2 * m2 :] + (states @ p.Yx + v.reshape(-1, m2) @ p.Yv).reshape(blocks, S, -1)
+            y[:, :K] = outputs.swapaxes(0, 1).reshape(S, K)
+        return y
 
 
 def decimate(u: Array, factor: int, phase: int, pad: int) -> Array:
@@ -75,58 +169,80 @@ def decimate(u: Array, factor: int, phase: int, pad: int) -> Array:
 
     u : ndarray, shape (S, N), N > pad.   phase : first kept sample, 0 to factor - 1.   Returns shape (S, K).
     """
-    op = operator(factor)
-    K = len(range(phase, u.shape[1], factor))
-    last = phase + (K - 1) * factor
-    Pu, Qu = _block_products(op, u[:, phase:last].reshape(len(u), K - 1, factor))
-    x = _recursion(op.lam**factor, _start(op, u, phase, pad), Pu)
-    f = op.D * u[:, phase::factor] + _output(op, x)
-    drive = op.lam[:, None] ** (factor - 1) * f[:, None, 1:] + Qu + op.Ma @ x[..., :-1] + op.Mb @ x[..., :-1].conj()
-    w = _recursion(op.lam**factor, _end(op, u, x[..., -1], last, pad), drive[..., ::-1])[..., ::-1]
-    return np.asarray(op.D * f + _output(op, w))
+    decimation = Decimation(plan(u.shape[1], factor, phase, pad), len(u))
+    for t0, t1 in decimation.plan.pieces():
+        decimation.take(u[:, t0:t1], t0)
+    return decimation.result()
 
 
-def _block_products(op: Operator, blocks: Array) -> tuple[Array, Array]:
-    """P u_k and Q u_k, complex, shape (S, m, K - 1) each, of blocks, shape (S, K - 1, n_d).
-
-    Products stay below the size at which BLAS starts threads: hundreds of short parallel products wait for each other more than they compute.
-    """
-    S, K1, _ = blocks.shape
-    m = len(op.lam)
-    M = np.vstack([op.P.real, op.P.imag, op.Q.real, op.Q.imag])
-    products = np.empty((S, 4 * m, K1))
-    step = max(1, SMALL // M.size)
-    for k in range(0, K1, step):
-        np.matmul(M, blocks[:, k : k + step].transpose(0, 2, 1), out=products[..., k : k + step])
-    return products[:, :m] + 1j * products[:, m : 2 * m], products[:, 2 * m : 3 * m] + 1j * products[:, 3 * m :]
+def _recursion(a: Array, x: Array, drive: Array) -> None:
+    """x_(b+1) = a x_b + drive_b: x, shape (B + 1, S, 2 m), x_0 given; drive, shape (B, S, 2 m)."""
+    z = x.view(complex)
+    for b, d in enumerate(drive.view(complex)):
+        np.multiply(a, z[b], out=z[b + 1])
+        z[b + 1] += d
 
 
-def _output(op: Operator, x: Array) -> Array:
-    """2 Re c'x, shape (S, K), by einsum: BLAS would start threads for each of the S short products."""
-    return np.asarray(2 * np.einsum("i,sik->sk", op.c, x).real)
+def _copy(u: Array, t0: int, window: Array, start: int) -> None:
+    """What u, samples from t0 on, holds of `window`, samples from `start` on."""
+    a, b = max(t0, start), min(t0 + u.shape[1], start + window.shape[1])
+    if a < b:
+        window[:, a - start : b - start] = u[:, a - t0 : b - t0]
 
 
-def _recursion(a: Array, start: Array, drive: Array) -> Array:
-    """x_0 = start, x_(k+1) = a x_k + drive_k along the last axis; start (S, m), drive (S, m, K - 1), a (m,); returns (S, m, K)."""
-    x = np.empty((*start.shape, drive.shape[-1] + 1), dtype=complex)
-    x[..., 0], x[..., 1:] = start, drive
-    for i in range(len(a)):
-        x[:, i] = lfilter([1.0], [1.0, -a[i]], x[:, i], axis=-1)
-    return x
+def _forward(op: Operator, length: int) -> tuple[Array, Array]:
+    """f of `length` samples: from these samples, shape (length, length), and from x at the first one, shape (length, 2 m)."""
+    return np.tril(toeplitz(op.impulse(length))), _output(op, op.lam[:, None] ** np.arange(length))
 
 
-def _start(op: Operator, u: Array, phase: int, pad: int) -> Array:
-    """x at the first kept sample, shape (S, m): steady state of e_(-pad), then the samples before."""
-    e = np.concatenate([2 * u[:, :1] - u[:, pad:0:-1], u[:, :phase]], axis=1)
-    length = e.shape[1]
-    return np.asarray(op.lam**length / (1 - op.lam) * e[:, :1] + e @ (op.lam ** np.arange(length)[::-1, None]))
+def _backward(op: Operator, length: int, kept: int) -> tuple[Array, Array]:
+    """From f of `length` samples: f_0 + lambda w_0, complex, shape (m, length), and y of the first `kept` instants, shape (kept, length)."""
+    h = op.impulse(length)
+    later = np.arange(length) - op.factor * np.arange(kept)[:, None]
+    return op.lam[:, None] ** np.arange(length), np.where(later < 0, 0.0, h[np.maximum(later, 0)])
 
 
-def _end(op: Operator, u: Array, x: Array, last: int, pad: int) -> Array:
-    """w at the last kept sample, shape (S, m): forward filter over the tail and its reflection, then backward from its steady state."""
-    N = u.shape[1]
-    e = np.concatenate([u[:, last:], 2 * u[:, -1:] - u[:, N - 1 - pad : N - 1][:, ::-1]], axis=1)
-    L = e.shape[1]
-    j = np.arange(L)[:, None]
-    f = 2 * (x @ (op.c * op.lam**j).T).real + e @ np.tril(toeplitz(op.impulse(L))).T
-    return np.asarray(op.lam ** (L - 1) / (1 - op.lam) * f[:, -1:] + f[:, 1:] @ (op.lam ** j[:-1]))
+def _start(op: Operator, phase: int, pad: int) -> Array:
+    """x at the first kept sample from the first samples, shape (T0, 2 m): steady state of the first reflected one, then the others."""
+    T0, length = max(pad + 1, phase), pad + phase
+    extended = np.zeros((length, T0))
+    extended[:pad, 0] = 2
+    extended[np.arange(pad), np.arange(pad, 0, -1)] = -1
+    extended[np.arange(pad, length), np.arange(phase)] = 1
+    effect = op.lam[:, None] ** np.arange(length)[::-1]
+    effect[:, 0] += op.lam**length / (1 - op.lam)
+    return _transposed(_pairs(effect @ extended))
+
+
+def _end(op: Operator, left: int, kept: int, pad: int) -> tuple[Array, Array]:
+    """v before, and y at, the last `kept` instants: from the last samples, shape (T, 2 m + kept), and from x at the first of the `left` ones."""
+    length, T = left + pad, max(left, pad + 1)
+    extended = np.zeros((length, T))
+    extended[np.arange(left), np.arange(T - left, T)] = 1
+    extended[left:, -1] = 2
+    extended[np.arange(left, length), T - 2 - np.arange(pad)] = -1
+    f_u, f_x = _forward(op, length)
+    v_f, y_f = _backward(op, length, kept)
+    v_f[:, -1] += op.lam**length / (1 - op.lam)  # the backward filter starts in the steady state of the last f
+    response = (op.c / (1 - op.lam))[:, None] * op.lam[:, None] ** (length - 1 - op.factor * np.arange(kept))
+    y_f[:, -1] += 2 * response.sum(axis=0).real
+    return (
+        _transposed(_pairs(v_f @ (f_u @ extended)), y_f @ (f_u @ extended)),
+        _transposed(_pairs(v_f @ f_x), y_f @ f_x),
+    )
+
+
+def _output(op: Operator, factors: Array) -> Array:
+    """2 Re c'(factors x) as a matrix on the pairs of x, shape (k, 2 m); factors complex, shape (m, k)."""
+    C = 2 * op.c[:, None] * factors
+    return np.asarray(np.stack([C.real, -C.imag], axis=1).reshape(-1, C.shape[1]).T)
+
+
+def _pairs(C: Array) -> Array:
+    """Complex rows, shape (m, k), as rows Re, Im, shape (2 m, k)."""
+    return np.asarray(np.stack([C.real, C.imag], axis=1).reshape(-1, C.shape[-1]))
+
+
+def _transposed(*rows: Array) -> Array:
+    """The rows, one below the other, as contiguous columns: maps act on signals from the right."""
+    return np.ascontiguousarray(np.vstack(rows).T)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from runtime.decimation import decimate, operator
+from runtime.decimation import Decimation, decimate, operator, plan
 
 
 @pytest.mark.parametrize("offset", [0, 100])
@@ -27,3 +27,15 @@ def test_impulse_response_is_that_of_the_filter():
     impulse[0] = 1
     sos = scipy.signal.cheby1(8, 0.05, 0.8 / 10, output="sos")
     np.testing.assert_allclose(operator(10).impulse(200), scipy.signal.sosfilt(sos, impulse), atol=1e-14)
+
+
+@pytest.mark.parametrize("phase", [0, 4, 6])
+@pytest.mark.parametrize("samples", [1, 100, 2000])
+def test_pieces_change_nothing(samples, phase):
+    """Pieces of whole blocks; room of one decimation serves the next."""
+    u = np.random.default_rng(1).normal(size=(2, 3, 1003)).cumsum(axis=-1)
+    pieces = Decimation(plan(1003, 7, phase, 27), 3)
+    for signals in u:
+        for t0, t1 in pieces.plan.pieces(samples):
+            pieces.take(signals[:, t0:t1], t0)
+        np.testing.assert_allclose(pieces.result(), decimate(signals, 7, phase, 27), rtol=0, atol=1e-13)
