@@ -64,6 +64,7 @@ class Estimate:
         `message` explains.
     groups : for "rank-deficient": the names that cannot be told apart, group by group.
     settings, provenance : what was asked for; hashes, versions and seed that reproduce it.
+    details : what only this method tells, by name (feasible: standard parameters, eigenvalues, what least squares alone gave).
     """
 
     names: tuple[str, ...]
@@ -86,6 +87,7 @@ class Estimate:
     settings: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         b = len(self.names)
@@ -141,6 +143,7 @@ class Estimate:
                 "provenance": self.provenance,
                 "units": self.units,
                 "covariance": self.covariance,
+                "details": self.details,
             }
         )
 
@@ -150,7 +153,7 @@ class Estimate:
         data = json.loads(text)
         if data.get("schema") != SCHEMA:
             raise ValueError(f"estimate.json has schema {data.get('schema')!r}; this version reads schema {SCHEMA}")
-        given = {f.name: data[f.name] for f in dataclasses.fields(cls)}
+        given = {f.name: data[f.name] for f in dataclasses.fields(cls) if f.name != "details" or f.name in data}
         for name in ("X", "sigma", "sigma_corrected", "covariance"):
             given[name] = np.array(given[name], dtype=float)
         given["covariance"] = given["covariance"].reshape(len(data["names"]), len(data["names"]))

@@ -63,7 +63,7 @@ def _convert(hint: Any, value: Any, path: Path) -> Any:
     if origin is not None:  # Mapping
         if not isinstance(value, Mapping):
             raise SettingsError(f"{_show(value)}; expected a mapping", path=path)
-        return dict(value)
+        return {str(k): _convert(get_args(hint)[1], v, (*path, k)) for k, v in value.items()}
     return _scalar(hint, value, path)
 
 
