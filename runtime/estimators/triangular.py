@@ -94,7 +94,7 @@ class Factor:
     def weighted(self, weights: Sequence[float] | Array) -> Factor:
         """The factor after multiplying the rows of joint j by weights[j]."""
         scaled = tuple(replace(joint, R=joint.R * w) for joint, w in zip(self.joints, weights, strict=True))
-        return Factor(self.names, _stacked(scaled, len(self.names)), scaled)
+        return Factor(self.names, stacked(scaled, len(self.names)), scaled)
 
     def select(self, names: Sequence[str]) -> Factor:
         """The factor of the columns `names` (in that order) and Y, from the small factors alone."""
@@ -126,7 +126,7 @@ def _select(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
     return replace(joint, columns=columns, R=joint.R[:, [*(position for _, position in found), joint.R.shape[1] - 1]])
 
 
-def _stacked(joints: Sequence[JointFactor], b: int) -> Array:
+def stacked(joints: Sequence[JointFactor], b: int) -> Array:
     blocks = []
     for joint in joints:
         block = np.zeros((len(joint.R), b + 1))
@@ -158,7 +158,7 @@ def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Fac
         R_j = np.asarray(np.linalg.qr(np.column_stack([W_j[:, columns], Y_j]), mode="r"))
         joints.append(JointFactor(columns, R_j, count))
         start += count
-    return Factor(tuple(names), _stacked(joints, b), tuple(joints))
+    return Factor(tuple(names), stacked(joints, b), tuple(joints))
 
 
 def combine(parts: Sequence[Factor]) -> Factor:
@@ -169,7 +169,7 @@ def combine(parts: Sequence[Factor]) -> Factor:
     b = len(first.names)
     joints = []
     for same in zip(*(part.joints for part in parts), strict=True):
-        R = _stacked(same, b)
+        R = stacked(same, b)
         columns = np.flatnonzero(R[:, :-1].any(axis=0))
         joints.append(JointFactor(columns, R[:, [*columns, b]], sum(joint.rows for joint in same)))
-    return Factor(first.names, _stacked(joints, b), tuple(joints))
+    return Factor(first.names, stacked(joints, b), tuple(joints))

@@ -1,0 +1,147 @@
+"""Normal equations by joint: the digits they keep, against least squares in extended precision; blocks and kept rows change nothing."""
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from runtime.errors import InputError
+from runtime.estimators.normal import LIMIT, least_squares, normal, triangular
+from runtime.estimators.solution import solve
+from runtime.model import load_model
+from runtime.reductions import JointRows, joint_columns, normal_equations, triangular_factor
+
+N = 2003  # no multiple of a block
+
+
+@lru_cache
+def model():
+    return load_model(Path(__file__).parents[2] / "generated" / "tx40.py")
+
+
+@lru_cache
+def states(swing):
+    """q, qd, qdd, tau of a TX40 that swings slowly with the given amplitude, rad, with torque noise of 0.05 N m."""
+    rng = np.random.default_rng(1)
+    t = np.linspace(0, 10, N)[:, None]
+    q, qd, qdd = np.zeros((3, N, 6))
+    for f in (0.31, 0.83, 1.27):
+        w, phase, a = 2 * np.pi * f * 0.1, rng.uniform(0, 6, 6), swing * rng.uniform(0.3, 1.0, 6)
+        wt = w * t + phase
+        q, qd, qdd = q + a * np.sin(wt), qd + a * w * np.cos(wt), qdd - a * w**2 * np.sin(wt)
+    X = model().base_parameters(model().VALUES)
+    tau = model().inverse_dynamics(q, qd, qdd, X) + rng.normal(scale=0.05, size=(N, 6))
+    return q, qd, qdd, tau
+
+
+@lru_cache
+def extended(swing):
+    """Least squares by refinement with residuals in extended precision, from the triangular factor; kappa of W with unit columns; W, Y."""
+    q, qd, qdd, tau = states(swing)
+    W, Y = model().observation_matrix(q, qd, qdd), tau.T.ravel()
+    D = np.linalg.norm(W, axis=0)
+    R = np.linalg.qr(W / D, mode="r")
+    exact, X = (W / D).astype(np.longdouble), np.zeros(60, dtype=np.longdouble)
+    for _ in range(12):
+        g = (exact.T @ (Y - exact @ X)).astype(float)
+        step = np.linalg.solve(R, np.linalg.solve(R.T, g))
+        X = X + step
+    assert np.linalg.norm(step) < 1e-17 * np.linalg.norm(X.astype(float)) * np.linalg.cond(R)
+    return X / D, float(np.linalg.cond(R)), W, Y
+
+
+def error(X, swing):
+    exact = extended(swing)[0]
+    return float(np.max(np.abs(X - exact)) / np.max(np.abs(exact)))
+
+
+def by_equations(swing, refinements):
+    rows = JointRows(model(), *states(swing), block=500, kept=2**30)
+    return least_squares(lambda: rows, rows.columns, 60, refinements=refinements, limit=np.inf)
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no extended precision on this machine")
+@pytest.mark.parametrize("swing", [3.0, 0.3, 0.1, 0.03])
+def test_digits_by_condition_number(swing):
+    """The table of the theory note (section 5): normal equations lose kappa^2 eps, one refinement gives the digits of QR back up to kappa 1e5."""
+    _, kappa, W, Y = extended(swing)
+    eps = np.finfo(float).eps
+    plain, once, twice = (by_equations(swing, k) for k in (0, 1, 2))
+    by_lstsq = error(np.linalg.lstsq(W, Y, rcond=None)[0], swing)
+    by_factor = error(solve(triangular_factor(model(), *states(swing), block=500)).X, swing)
+    print(f"kappa {kappa:.1e}: lstsq {by_lstsq:.1e} factor {by_factor:.1e}", *(f"{error(x.X, swing):.1e}" for x in (plain, once, twice)))
+    assert error(plain.X, swing) < 10 * kappa**2 * eps
+    assert error(once.X, swing) < max(10 * by_lstsq, (10 * kappa**2 * eps) ** 2, 1e-14)
+    assert error(twice.X, swing) < max(10 * by_lstsq, (10 * kappa**2 * eps) ** 3, 1e-14)
+    assert by_factor < 10 * by_lstsq + 1e-14
+    assert 0.1 * kappa < once.kappa < 10 * kappa
+
+
+@pytest.mark.parametrize("block", [7, 97, 1000, N, 10 * N])
+@pytest.mark.parametrize("kept", [0, 10**6, 2**30])
+def test_blocks_and_kept_rows_change_nothing(block, kept):
+    """Sums in another order: equal to rounding times kappa."""
+    q, qd, qdd, tau = states(3.0)
+    W, Y = model().observation_matrix(q, qd, qdd), tau.T.ravel()
+    exact = np.linalg.lstsq(W, Y, rcond=None)[0]
+    found = normal_equations(model(), q, qd, qdd, tau, block=block, kept=kept)
+    assert found.method == "normal equations"
+    np.testing.assert_allclose(found.X, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
+    norms = np.linalg.norm((Y - W @ exact).reshape(6, -1), axis=1)
+    np.testing.assert_allclose(found.residual_norms, norms, rtol=1e-10)
+
+
+def test_residual_norms_of_an_exact_fit():
+    """y'y - X'g would leave sqrt(eps) ||Y||; the refinement reads them from the rows."""
+    q, qd, qdd, _ = states(3.0)
+    X = np.arange(1.0, 61.0)
+    tau = model().inverse_dynamics(q, qd, qdd, X)
+    found = normal_equations(model(), q, qd, qdd, tau)
+    np.testing.assert_allclose(found.X, X, rtol=1e-11)
+    assert (found.residual_norms < 1e-11 * np.linalg.norm(tau, axis=0)).all()
+
+
+def test_ill_conditioned_rows_go_to_the_triangular_factor():
+    found = normal_equations(model(), *states(0.1))
+    assert found.method == "triangular factor" and found.kappa > LIMIT
+    assert error(found.X, 0.1) < 1e-9
+
+
+def test_rows_that_do_not_determine_every_parameter():
+    q, qd, qdd, tau = (x.copy() for x in states(3.0))
+    q[:, 5], qd[:, 5], qdd[:, 5] = 0.3, 0, 0
+    found = normal_equations(model(), q, qd, qdd, tau)
+    W, Y = model().observation_matrix(q, qd, qdd), tau.T.ravel()
+    assert found.method == "triangular factor" and np.isinf(found.kappa)
+    best = np.linalg.norm(Y - W @ np.linalg.lstsq(W, Y, rcond=None)[0])
+    np.testing.assert_allclose(np.linalg.norm(found.residual_norms), best, rtol=1e-9)
+
+
+def test_factor_and_equations_have_the_gram_matrix_of_the_rows():
+    q, qd, qdd, tau = states(3.0)
+    whole = np.column_stack([model().observation_matrix(q, qd, qdd), tau.T.ravel()])
+    rows = JointRows(model(), q, qd, qdd, tau, block=333)
+    equations, factor = normal(rows, rows.columns, 60), triangular(rows, rows.columns, model().BASE_PARAMETERS)
+    scale = np.outer(*2 * [np.linalg.norm(whole, axis=0)])
+    np.testing.assert_allclose(equations.A / scale[:60, :60], (whole.T @ whole / scale)[:60, :60], atol=1e-13)
+    np.testing.assert_allclose(equations.g / scale[:60, 60], (whole.T @ whole / scale)[:60, 60], atol=1e-13)
+    np.testing.assert_allclose(factor.R.T @ factor.R / scale, whole.T @ whole / scale, atol=1e-13)
+    assert factor.rows == 6 * N
+
+
+def test_only_columns_that_act_on_a_joint_are_multiplied():
+    sizes = [len(C) for C in joint_columns(model())]
+    assert sum(sizes) == int(np.sum(model().STRUCTURE)) < 6 * 60
+    block = next(iter(JointRows(model(), *states(3.0), block=100)))
+    assert [rows.shape for rows in block] == [(size + 1, 100) for size in sizes]
+
+
+def test_shapes_and_blocks_that_cannot_be():
+    q, qd, qdd, tau = states(3.0)
+    with pytest.raises(InputError, match=r"tau \(2003, 5\)"):
+        normal_equations(model(), q, qd, qdd, tau[:, :5])
+    with pytest.raises(InputError, match="qd has shape"):
+        normal_equations(model(), q, qd[:-1], qdd, tau)
+    with pytest.raises(InputError, match="block 0"):
+        triangular_factor(model(), q, qd, qdd, tau, block=0)
