@@ -13,6 +13,7 @@ import ctypes
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, cast
 
@@ -24,7 +25,7 @@ from runtime.studies.compile_cache import FallbackWarning, NotCompiledError, cac
 
 Array = np.ndarray
 
-ABI = 1
+ABI = 2
 TOLERANCE = 1e-10  # of the largest entry: the self-check looks for wrong code, not for rounding
 STATES = {
     "regressor": ("q", "qd", "qdd"),
@@ -60,11 +61,34 @@ def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: 
         return model
 
 
+@dataclass(frozen=True)
+class Signals:
+    """The distinct rows of the store S, shape (b, n, N), as a C function, for other C code: S[column, row] = sign U[signal].
+
+    address : of int32_t f(int64_t m, const double *q, const double *qd, const double *qdd, int64_t stride, const double *constants,
+        double *U, int64_t ustride), which fills U[s*ustride + t], t < m, from states of which joint j has m samples from j*stride on and
+        returns 0, or 1 if a pointer is missing or m exceeds ustride. It allocates nothing and may run in many threads.
+    count : number of signals s; those of constant entries are filled too.   tile : samples treated together; m costs as the next multiple.
+    column, row, signal, sign : (entries,), base parameter, joint, signal and +1 or -1 of every entry that is not zero.
+    constant : (entries,), whether no state changes the entry.
+    """
+
+    address: int
+    count: int
+    tile: int
+    column: Array
+    row: Array
+    signal: Array
+    sign: Array
+    constant: Array
+
+
 class CompiledModel:
-    """The API of the generated module; what the C file lacks is that of the module."""
+    """The API of the generated module; what the C file lacks is that of the module. `signals`: for other C code."""
 
     def __init__(self, model: DynamicModel, library: ctypes.CDLL) -> None:
         self._model, self._library = model, library
+        self.signals = _signals(library, model)
         self._n, self._b = len(model.JOINTS), len(model.BASE_PARAMETERS)
         self._third = _third_of_last_cache()
 
@@ -160,6 +184,17 @@ class CompiledModel:
         status = getattr(self._library, f"{self._model.NAME}_{name}")(ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream))
         if status:
             raise InputError(f"{self._model.NAME}: {name} in C refused its arguments with {status}")
+
+
+def _signals(library: ctypes.CDLL, model: GeneratedModel) -> Signals:
+    tile, count, entries = (
+        ctypes.c_int32.in_dll(library, f"{model.NAME}_{name}").value for name in ("tile", "signal_count", "entry_count")
+    )
+    place, signal, sign = np.array((ctypes.c_int32 * 3 * entries).in_dll(library, f"{model.NAME}_entries"), dtype=np.intp).reshape(-1, 3).T
+    column, row = np.divmod(place, len(model.JOINTS))
+    address = ctypes.cast(getattr(library, f"{model.NAME}_signals"), ctypes.c_void_p).value
+    constant = np.arange(entries) >= ctypes.c_int32.in_dll(library, f"{model.NAME}_varying_count").value
+    return Signals(cast(int, address), count, tile, column, row, signal, sign, constant)
 
 
 def _third_of_last_cache() -> int:

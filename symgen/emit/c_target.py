@@ -18,11 +18,11 @@ from symgen.emit.printers import Section
 from symgen.emit.spec import LOCALS, STATES, WIDTH, Headings, ModuleSpec, inertia_graph, regressor_program, torque_graph
 from symgen.regroup.regrouping import Regrouping
 
-ABI = 1
+ABI = 2
 SCRATCH = 262144  # bytes of stack for the results of one tile
 FLAGS = "-std=c11 -O2 -ftree-vectorize -fno-math-errno -fno-trapping-math -ffp-contract=off -shared -fPIC"
 SUMMARIES = {  # states, whether X is read, result, summary
-    "regressor": (("q", "qd", "qdd"), False, "D", "D, shape (b, n, N): Gamma_j = sum_k D[k][j] X[k]; only rows that are not constant"),
+    "regressor": (("q", "qd", "qdd"), False, "D", "S, shape (b, n, N): Gamma_j = sum_k S[k][j] X[k]; only rows that are not constant"),
     "inverse_dynamics": (("q", "qd", "qdd"), True, "GAM", "Gamma, shape (n, N)"),
     "inertia_matrix": (("q",), True, "A", "A(q), shape (n, n, N): column i is Gamma for a unit acceleration of joint i from rest"),
     "bias": (("q", "qd"), True, "GAM", "Gamma at qdd = 0, shape (n, N)"),
@@ -34,7 +34,7 @@ Outputs = list[tuple[int, str, str, Scalar | int]]  # row of the store, heading,
 
 @dataclass(frozen=True)
 class Kernel:
-    """One function of the C file; `arguments` are those of the tile function, `rows` pairs (row of the store, row of the tile)."""
+    """One function of the C file; `rows` holds {row of the store, signal, sign}, `count` of them written by the function itself."""
 
     name: str
     summary: str
@@ -49,6 +49,7 @@ class Kernel:
     calls: int
     sections: tuple[Section, ...]
     rows: tuple[str, ...]
+    entries: int
     count: int
     computed: int
 
@@ -77,7 +78,7 @@ def c_spec(spec: ModuleSpec) -> CSpec:
     regressor: Outputs = [
         (k * n + row, f"Joint {robot.joints[row]}", f"DG{robot.joints[row]}{regrouping.own[k]}", value)
         for (k, row), value in sorted(zip(entries, program.outputs, strict=True), key=lambda entry: entry[0][1])
-        if isinstance(value, Scalar)
+        if isinstance(value, Scalar) or value
     ]
     triangle, headings = inertia_graph(regrouping)
     matrix: Outputs = []
@@ -101,17 +102,10 @@ def _kernel(regrouping: Regrouping, name: str, outputs: Outputs, headings: Headi
     robot = regrouping.robot
     states, reads_X, result, summary = SUMMARIES[name]
     text = CText([value for *_, value in outputs], headings, (*LOCALS, *robot.constants))
-    places: dict[str, int] = {}  # expression: row of the tile
-    comments: dict[str, list[str]] = {}
-    under: dict[str, list[str]] = {}  # heading: expressions
-    rows = []
-    for row, heading, comment, value in outputs:
-        expression = text.expression(value)
-        if expression not in places:
-            places[expression] = len(places)
-            under.setdefault(heading, []).append(expression)
-        rows.append(f"{{{row}, {places[expression]}}}")
-        comments.setdefault(expression, []).append(comment)
+    signals = Signals(outputs)
+    under: dict[str, list[str]] = {}  # heading: lines
+    for k, (heading, value, comments) in enumerate(signals.computed):
+        under.setdefault(heading, []).append(_result(result, k, text.expression(value), comments))
     independent = close(robot).independent
     place = {f"{letter}{j}": (state, k) for state, letter in STATES.items() for k, j in enumerate(independent)}
     needed = text.inputs
@@ -124,7 +118,7 @@ def _kernel(regrouping: Regrouping, name: str, outputs: Outputs, headings: Headi
     waves = [(title, [line for call, line in calls if function in call]) for title, function in (("Cosines", "cos("), ("Sines", "sin("))]
     inputs = [_input(name, *place[name]) for name in place if name in text.main_inputs]
     recalled = [f"const double {called} = T[{k}][t];" for k, (called, _) in enumerate(trigonometry)]
-    results = [Section(title, tuple(_result(result, places[e], e, comments[e]) for e in found)) for title, found in under.items()]
+    results = (Section(title, tuple(lines)) for title, lines in under.items())
     sections = [Section("Inputs", (*inputs, *recalled)), *text.sections, *results]
     read = text.trigonometry_inputs | text.main_inputs
     return Kernel(
@@ -140,10 +134,30 @@ def _kernel(regrouping: Regrouping, name: str, outputs: Outputs, headings: Headi
         trigonometry=tuple(Section(title, (*angles, *text.angles, *lines)) for title, lines in waves if lines),
         calls=len(trigonometry),
         sections=tuple(s for s in sections if s.lines),
-        rows=tuple(packed(rows)),
-        count=len(rows),
-        computed=len(places),
+        rows=tuple(packed([f"{{{row}, {signal}, {sign}}}" for row, signal, sign in signals.rows])),
+        entries=len(signals.rows),
+        count=len(signals.rows) - signals.constant * (name == "regressor"),  # its store holds constants from the start
+        computed=len(signals.computed),
     )
+
+
+class Signals:
+    """The distinct rows of a result, up to sign: `rows` of the store as (row, signal, sign), the `constant` last of them numbers."""
+
+    def __init__(self, outputs: Outputs) -> None:
+        self.computed: list[tuple[str, Scalar | int, list[str]]] = []  # heading, value, comments
+        self.rows: list[tuple[int, int, int]] = []
+        first: dict[tuple[str, int], tuple[int, int]] = {}  # node or number: signal, sign
+        numbers = [output for output in outputs if not isinstance(output[-1], Scalar)]
+        self.constant = len(numbers)
+        for row, heading, comment, value in [*(o for o in outputs if isinstance(o[-1], Scalar)), *numbers]:
+            key = ("node", value.node.index) if isinstance(value, Scalar) else ("number", abs(value))
+            own = value.sign if isinstance(value, Scalar) else -1 if value < 0 else 1
+            signal, sign = first.setdefault(key, (len(self.computed), own))
+            if signal == len(self.computed):
+                self.computed.append((heading, value, []))
+            self.computed[signal][2].append(comment)
+            self.rows.append((row, signal, own * sign))
 
 
 def _input(name: str, state: str, k: int) -> str:
@@ -194,6 +208,23 @@ def layout(spec: CSpec) -> list[dict[str, object]]:
             }
         )
     return found
+
+
+def signals_layout(spec: CSpec) -> dict[str, object]:
+    """The function that gives the distinct signals of the regressor, with its table of entries."""
+    k = spec.kernels[0]
+    own = [
+        "int64_t m",
+        *(f"const double *{s}" for s in k.states),
+        "int64_t stride",
+        "const double *constants",
+        "double *U",
+        "int64_t ustride",
+    ]
+    return {
+        "prototype": signature(f"int32_t {spec.robot.name}_signals", own),
+        "missing": " || ".join(f"{p} == NULL" for p in [*k.states, "constants", "U"]),
+    }
 
 
 def signature(name: str, parameters: Sequence[str]) -> str:

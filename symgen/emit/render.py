@@ -132,6 +132,7 @@ def render_c(spec: ModuleSpec, *, command: str | None = None) -> str:
         "tile": c.tile,
         "kernels": layout(c),
         "signals": signals_layout(c),
+        "signals": signals_layout(c),
         "helpers": {name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")},
     }
     return _environment().get_template("kernels.c.jinja").render(context)

@@ -108,6 +108,8 @@ MAIN = """
 #include <stdlib.h>
 int32_t {name}_regressor(int64_t, const double *, const double *, const double *, const double *, double *, int32_t);
 int32_t {name}_inertia_matrix(int64_t, const double *, const double *, const double *, double *, int32_t);
+int32_t {name}_signals(int64_t, const double *, const double *, const double *, int64_t, const double *, double *, int64_t);
+extern const int32_t {name}_signal_count;
 int main(void)
 {{
     const double constants[] = {{{constants}}};
@@ -119,7 +121,10 @@ int main(void)
                 return 1;
             if ({name}_regressor(-1, q, q, q, constants, S, flags) != 1 || {name}_regressor(N, q, q, NULL, constants, S, flags) != 1)
                 return 2;
-            free(q), free(X), free(S), free(A);
+            double *U = calloc((size_t)(N*{name}_signal_count + 1), sizeof *U);
+            if ({name}_signals(N, q, q, q, N, constants, U, N) || {name}_signals(N, q, q, q, N, constants, NULL, N) != 1)
+                return 3;
+            free(q), free(X), free(S), free(A), free(U);
         }}
     return 0;
 }}

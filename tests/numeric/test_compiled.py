@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import os
 import shutil
@@ -16,7 +17,7 @@ import pytest
 from runtime import GeneratedModel, load_model
 from runtime.errors import InputError
 from runtime.studies.compiled import CompiledModel, FallbackWarning, cache_folder, compiled_model
-from symgen.description import load_robot
+from symgen.description import load_robot, parse_robot
 from symgen.emit import generate_files
 
 NAME = "planar_2r"
@@ -119,6 +120,50 @@ def test_shapes_are_checked_before_c_reads(wrong: np.ndarray, model: GeneratedMo
         c.gravity(q, np.zeros(3))
 
 
+OPPOSED = b"""
+symgen: 1
+name: opposed
+gravity: [0, -g, 0]
+constants: {D2: 0.5, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: pi, d: D2, theta: q2, r: 0}
+elements:
+  OFFSET: {kind: offset, along: all}
+"""
+
+
+@needs_compiler
+def test_signals(tmp_path: Path) -> None:
+    """Each row once, whatever its sign: link 2 turns about opposite axes at its two joints, so its rows are equal up to sign."""
+    for name, text in generate_files(parse_robot(OPPOSED, "opposed.yaml"), targets=("numpy", "c")).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    model = load_model("opposed", folder=tmp_path)
+    c = in_c(model, tmp_path)
+    signals, constants = c.signals, np.array([*model.CONSTANTS.values()])
+    assert set(signals.sign) == {-1, 1} and signals.count < len(signals.row) == np.sum(model.STRUCTURE)
+    assert {
+        (model.BASE_PARAMETERS[k], j) for k, j in zip(signals.column[signals.constant], signals.row[signals.constant], strict=True)
+    } == {
+        ("OFFSET1", 0),
+        ("OFFSET2", 1),
+    }
+    pointer, integer = ctypes.c_void_p, ctypes.c_int64
+    fill = ctypes.CFUNCTYPE(ctypes.c_int32, integer, pointer, pointer, pointer, integer, pointer, pointer, integer)(signals.address)
+    for m in (0, 1, signals.tile, 3 * signals.tile + 5):
+        rows, U = np.random.default_rng(m).uniform(-2, 2, (3, 2, m + 3)), np.full((signals.count, m + 2), np.nan)
+        addresses = [x.ctypes.data for x in (*rows, constants, U)]
+        assert fill(m, *addresses[:3], m + 3, *addresses[3:], m + 2) == 0
+        assert np.isnan(U[:, m:]).all()
+        S = model.store(m).view(np.ndarray)
+        S[:] = 0.0
+        S[signals.column, signals.row] = signals.sign[:, None] * U[signals.signal, :m]
+        states = [x[:, :m].T for x in rows]
+        np.testing.assert_allclose(S.transpose(2, 1, 0), model.regressor(*states), rtol=1e-12, atol=1e-12)
+        np.testing.assert_array_equal(S.transpose(2, 1, 0), c.regressor(*states))
+        assert fill(m, *addresses[:3], m + 3, *addresses[3:], m - 1) == 1 and fill(-1, *addresses[:3], 9, *addresses[3:], 9) == 1
+
+
 @needs_compiler
 def test_large_results_are_streamed(model: GeneratedModel, warm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     c, given = in_c(model, warm), states(203)
@@ -206,7 +251,7 @@ def test_sources_that_do_not_fit(model: GeneratedModel, folder: Path, tmp_path: 
     wrong = {
         "syntax": (text + "int", "failed with 1"),
         "robot": (text.replace(model.SOURCE_SHA256, "0" * 64), "different robot files"),
-        "interface": (text.replace("_abi(void) { return 1; }", "_abi(void) { return 99; }"), "interface 99"),
+        "interface": (text.replace("_abi(void) { return 2; }", "_abi(void) { return 99; }"), "interface 99"),
         "name": (text.replace(f"{NAME}_", "other_"), "not that of"),
         "values": (text.replace("D[0][t] =", "D[0][t] = 3.0 +", 1), "differs from NumPy"),
     }
