@@ -1,8 +1,9 @@
 """Running an emitted file given by path: only if its syntax tree is one an emitter writes.
 
-Allowed at the top: a docstring, `import numpy as np` or `import casadi as ca`, assignments, functions and classes. Inside: no further import, no
-name with two leading underscores besides a few, no global state, and only names that the file defines itself, a short list of builtins and the
-numerical part of the one package it imports. CasADi functions can compile and run C, and write files: of them only the construction from
+Allowed at the top: a docstring, one import (`import numpy as np`, `import casadi as ca` or `from array_api_compat import array_namespace`),
+assignments, functions and classes. Inside: no further import, no name with two leading underscores besides a few, no global state, and only names
+that the file defines itself, a short list of builtins and the numerical part of the one package it imports. A file for arrays of any package sees
+their namespaces under names of its own, so there every attribute, of whatever object, is one of a short list. CasADi functions can compile and run C, and write files: of them only the construction from
 expressions is allowed, with `default_in` as the one option. What is checked is what runs: the text is read once.
 """
 
@@ -60,6 +61,10 @@ CASADI = _words("Function SX cos cross fmax fmin horzcat jacobian pi sign sin sq
 CASADI_ATTRIBUTES = frozenset(
     {"T", "eye", "sym", "values"}
 )  # of anything else in a file that imports casadi: no save, generate, from_file ...
+ARRAYS = "array_namespace"  # called, never passed on
+ARRAY_ATTRIBUTES = _words(
+    "clip concat cos cross dtype float64 keys linalg moveaxis permute_dims pi reshape shape sin solve sqrt stack where zeros_like"
+)
 PACKAGES = {"np": ("numpy", NUMPY), "ca": ("casadi", CASADI)}
 HIDDEN = (frozenset(dir(builtins)) - BUILTINS) | {"np"}  # open, eval, exec, getattr, vars ...: neither used nor redefined
 FILES = frozenset(
@@ -112,6 +117,9 @@ def module_of(path: Path) -> ModuleType:
     module.__file__ = str(path)
     try:
         loader.exec_module(module)
+    except ModuleNotFoundError as e:
+        extra = ": pip install symgen[gpu]" if e.name == "array_api_compat" else ""
+        raise ModelError(f"needs {e.name}, which is not installed{extra}", file=str(path)) from e
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(f"fails on import with {type(e).__name__}: {e}; emit it again", file=str(path)) from e
     return module
@@ -129,7 +137,7 @@ def check_source(text: str, file: str) -> None:
         _check_statement(statement, file)
     aliases = {alias for statement in tree.body if (alias := _imported(statement))}
     if len(aliases) > 1:
-        raise ModelError("imports numpy and casadi; an emitted model has one array package", file=file)
+        raise ModelError("imports several packages; an emitted model has one array package", file=file)
     own = _defined(tree)
     shadowed = sorted(own & (HIDDEN | aliases))
     if shadowed:
@@ -137,26 +145,34 @@ def check_source(text: str, file: str) -> None:
     imports = {id(node) for node in tree.body if _imported(node)}
     modules = {
         id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)
-    }  # np and np.linalg only as np.name, np.linalg.name
+    }  # np, np.linalg only as np.name, np.linalg.name
+    modules |= {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call) and _is_name(node.func, ARRAYS)}
     for part in ast.walk(tree):
         if id(part) not in imports:
             _check_node(part, BUILTINS | own | aliases, file)
         if isinstance(part, ast.Name) and part.id in aliases and id(part) not in modules:
-            _refuse(part, f"{PACKAGES[part.id][0]} itself is not passed on", file)
+            _refuse(part, f"{PACKAGES[part.id][0] if part.id in PACKAGES else part.id} itself is not passed on", file)
         if _is_linalg(part) and id(part) not in modules:
             _refuse(part, "numpy.linalg itself is not passed on", file)
     if "ca" in aliases:
         _check_casadi(tree, file)
+    if ARRAYS in aliases:
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and node.attr not in ARRAY_ATTRIBUTES:
+                _refuse(node, "an attribute that emitted models of arrays do not use", file)
 
 
 def _check_statement(node: ast.stmt, file: str) -> None:
     text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
     if not (text or _imported(node) or isinstance(node, ast.Assign | ast.AnnAssign | ast.FunctionDef | ast.ClassDef)):
-        _refuse(node, "expected a docstring, `import numpy as np` or `import casadi as ca`, an assignment, a function or a class", file)
+        _refuse(node, "expected a docstring, the import of an array package, an assignment, a function or a class", file)
 
 
 def _imported(node: ast.AST) -> str | None:
-    """Alias of the array package that the statement imports."""
+    """What the statement, an import of an array package as emitters write it, makes known."""
+    if isinstance(node, ast.ImportFrom):
+        found = (node.module, node.level, [(a.name, a.asname) for a in node.names])
+        return ARRAYS if found == ("array_api_compat", 0, [(ARRAYS, None)]) else None
     if not isinstance(node, ast.Import):
         return None
     return next((alias for alias, (name, _) in PACKAGES.items() if [(a.name, a.asname) for a in node.names] == [(name, alias)]), None)

@@ -31,6 +31,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "h5py": ("runtime/io/mat.py",),
     "rosbags": ("runtime/io/bags.py",),
     "cvxpy": ("runtime/studies/consistency.py",),
+    "array_api_compat": ("runtime/studies/device.py", "generated/"),
     "dask": ("runtime/studies/distributed.py",),
     "distributed": ("runtime/studies/distributed.py",),
     "scipy": ("runtime/",),
@@ -95,7 +96,8 @@ def test_only_the_command_line_imports_both_halves() -> None:
 
 @pytest.mark.parametrize("name", [n for n in MODULES if n.startswith("generated.")])
 def test_emitted_modules_import_one_array_package(name: str) -> None:
-    assert imports(name) == ({"casadi"} if name.endswith("_casadi") else {"numpy"})
+    package = {"casadi": "casadi", "xp": "array_api_compat"}.get(name.rpartition("_")[2], "numpy")
+    assert imports(name) == {package}
 
 
 @pytest.mark.parametrize("library", ONLY_IN)

@@ -12,7 +12,7 @@ import typer
 from symgen.cli.session import NEGATIVE, fail, reported_errors
 from symgen.cli.writing import write_all
 
-TARGETS = {"numpy": "{}.py", "casadi": "{}_casadi.py", "c": "{}.c"}
+TARGETS = {"numpy": "{}.py", "casadi": "{}_casadi.py", "c": "{}.c", "xp": "{}_xp.py"}
 
 
 def generate(
@@ -20,10 +20,12 @@ def generate(
         list[str], typer.Argument(metavar="ROBOT...", help="Packaged robots or robot files (.yaml); `all` for every packaged one.")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the modules.")] = Path("generated"),
-    target: Annotated[str, typer.Option(help="What to emit: numpy, casadi, c, or several as numpy,c.")] = "numpy",
+    target: Annotated[
+        str, typer.Option(help="What to emit: numpy, casadi, c, xp (arrays of any package), or several as numpy,c.")
+    ] = "numpy",
     check: Annotated[bool, typer.Option("--check", help="Write nothing; fail with a diff where a module is not current.")] = False,
 ) -> None:
-    """Derive the models of each ROBOT and write them as OUTPUT/<name>.py, _casadi.py for CasADi, .c for C. All are written, or none."""
+    """Derive the models of each ROBOT and write them as OUTPUT/<name>.py, _casadi.py, .c or _xp.py. All are written, or none."""
     with reported_errors():
         targets = tuple(dict.fromkeys(part.strip() for part in target.split(",")))
         if unknown := [part for part in targets if part not in TARGETS]:

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from symgen.description.robot import Robot
 from symgen.emit.c_target import has_c_target
 from symgen.emit.casadi_target import CasadiText
-from symgen.emit.render import render, render_c, render_casadi
+from symgen.emit.render import render, render_c, render_casadi, render_xp
 from symgen.emit.spec import module_spec
 from symgen.regroup.regrouping import regroup
 
 __all__ = ["TARGETS", "generate_files", "generate_module"]
 
-TARGETS = ("numpy", "casadi", "c")
+TARGETS = ("numpy", "casadi", "c", "xp")
 
 
 def generate_module(robot: Robot, *, command: str | None = None) -> str:
@@ -20,7 +20,7 @@ def generate_module(robot: Robot, *, command: str | None = None) -> str:
 
 
 def generate_files(robot: Robot, *, targets: Sequence[str] = ("numpy",), command: str | None = None) -> dict[str, str]:
-    """{file name: text} of every target; CasADi and C are left out where the joints are tied by closure equations alone."""
+    """{file name: text} of every target; CasADi, C and xp are left out where the joints are tied by closure equations alone."""
     regrouping, files = regroup(robot), {}
     spec = module_spec(regrouping)
     for target in targets:
@@ -30,4 +30,6 @@ def generate_files(robot: Robot, *, targets: Sequence[str] = ("numpy",), command
             files[f"{robot.name}_casadi.py"] = render_casadi(module_spec(regrouping, CasadiText), command=command)
         elif target == "c" and has_c_target(robot):
             files[f"{robot.name}.c"] = render_c(spec, command=command)
+        elif target == "xp" and not spec.tied:
+            files[f"{robot.name}_xp.py"] = render_xp(spec, command=command)
     return files

@@ -17,6 +17,7 @@ from symgen.emit.header import header, literal, packed, tables
 from symgen.emit.physical import physical_tables
 from symgen.emit.printers import Section
 from symgen.emit.spec import WIDTH, ModuleSpec
+from symgen.emit.xp_target import array_spec, passive_rows
 from symgen.regroup.regrouping import formula
 from symgen.version import VERSION
 
@@ -51,17 +52,14 @@ def _environment() -> Environment:
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     """The NumPy module of `spec`. Same robot file, same version: same bytes."""
     sizes, constants = _sizes(spec), list(spec.robot.constants)
-    defaults = "".join(f", {name}={spec.robot.constants[name]!r}" for name in constants)
     context = {
         **_context(spec, command),
+        **_keywords(spec.robot),
         "size": BLOCK,
         "turn": loop_system(spec.robot).turn() if spec.tied else None,
         "joint": spec.robot.joints[0],
         "tables": [*tables(spec), *physical_tables(spec.robot), *_paths(spec.robot)],
         "constant_entries": spec.constant_entries,
-        "passed": "".join(f", {name}={name}" for name in constants),
-        "defaults": defaults,
-        "keywords": ", *" + defaults if constants else "",
         "blocks": [_block(name, spec, sizes, constants) for name in (*SUMMARIES, *(LOOP_SUMMARIES if spec.tied else ()))],
     }
     return _environment().get_template("module.py.jinja").render(context)
@@ -79,6 +77,25 @@ def render_casadi(spec: ModuleSpec, *, command: str | None = None) -> str:
         "blocks": blocks(spec),
     }
     return _environment().get_template("casadi.py.jinja").render(context)
+
+
+def render_xp(spec: ModuleSpec, *, command: str | None = None) -> str:
+    """The array-API module of `spec`. Same robot file, same version: same bytes."""
+    context = {
+        **_context(spec, command),
+        **_keywords(spec.robot),
+        **vars(array_spec(spec.regrouping)),
+        "tables": [*tables(spec, numpy=False), *_paths(spec.robot)],
+        "passive_rows": passive_rows(spec.robot),
+    }
+    return _environment().get_template("xp.py.jinja").render(context)
+
+
+def _keywords(robot: Robot) -> dict[str, str]:
+    """The constants of the robot in signatures and calls."""
+    defaults = "".join(f", {name}={value!r}" for name, value in robot.constants.items())
+    passed = "".join(f", {name}={name}" for name in robot.constants)
+    return {"passed": passed, "defaults": defaults, "keywords": ", *" + defaults if defaults else ""}
 
 
 def _sizes(spec: ModuleSpec) -> dict[str, int]:
@@ -131,7 +148,6 @@ def render_c(spec: ModuleSpec, *, command: str | None = None) -> str:
         "n": c.joints,
         "tile": c.tile,
         "kernels": layout(c),
-        "signals": signals_layout(c),
         "signals": signals_layout(c),
         "helpers": {name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")},
     }

@@ -1,0 +1,1836 @@
+"""Stäubli TX40, 6 revolute joints: base parameters, regressor, dynamics on the arrays of any package of the array API.
+
+GENERATED from tx40.yaml, sha256 fb8651f3f1d0, by symgen 0.1.0. Do not edit; symgen generate tx40 --target xp
+
+Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
+    j  ant  sigma  alpha   d  theta    r
+    1    0      0      0   0     q1    0
+    2    1      0  -pi/2   0     q2    0
+    3    2      0      0  D3     q3    0
+    4    3      0   pi/2   0     q4  RL4
+    5    4      0  -pi/2   0     q5    0
+    6    5      0   pi/2   0     q6    0
+Gravity     acceleration (0, 0, -g) in frame 0, m/s**2
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Element     Ia      inertia: along q1, q2, q3, q4, q5; Ia6 in the form q6**2 + 2*q5*q6
+Element     FV      viscous: along q1, q2, q3, q4, q5, q6
+Element     FS      coulomb: along q1, q2, q3, q4, q5, q6
+Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6
+Element     FVM     viscous: FVM6 in the form 2*q5*q6
+Element     FSM     coulomb: FSM6 along q5 + q6
+
+Base parameters, 60 of 86; Gautier and Khalil (1990), exact over F_p
+    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + D3**2*(M3 + M4 + M5 + M6)
+    XX2R = XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)
+    XZ2R = XZ2 - D3*MZ3
+    ZZ2R = ZZ2 + Ia2 + D3**2*(M3 + M4 + M5 + M6)
+    MX2R = MX2 + D3*(M3 + M4 + M5 + M6)
+    XX3R = XX3 - YY3 + YY4 + 2*RL4*MZ4 + RL4**2*(M4 + M5 + M6)
+    ZZ3R = ZZ3 + YY4 + 2*RL4*MZ4 + RL4**2*(M4 + M5 + M6)
+    MY3R = MY3 - MZ4 - RL4*(M4 + M5 + M6)
+    XX4R = XX4 - YY4 + YY5
+    ZZ4R = ZZ4 + YY5
+    MY4R = MY4 + MZ5
+    XX5R = XX5 - YY5 + YY6
+    ZZ5R = ZZ5 + YY6
+    MY5R = MY5 - MZ6
+    XX6R = XX6 - YY6
+    as they are: FV1 FS1 OFFSET1 XY2 YZ2 MY2 FV2 FS2 OFFSET2 XY3 XZ3 YZ3 MX3 Ia3 FV3 FS3 OFFSET3 XY4 XZ4 YZ4 MX4 Ia4 FV4
+        FS4 OFFSET4 XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5 OFFSET5 XY6 XZ6 YZ6 ZZ6 MX6 MY6 Ia6 FV6 FS6 OFFSET6 FVM6 FSM6
+No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
+
+Cost per sample
+    regressor         355 multiplications, 263 additions, 6 sin, 6 cos
+    inverse_dynamics  261 multiplications, 259 additions, 6 sin, 6 cos
+    inertia_matrix    259 multiplications, 194 additions, 6 sin, 6 cos
+    bias              247 multiplications, 224 additions, 6 sin, 6 cos
+    gravity           50 multiplications, 34 additions, 5 sin, 5 cos
+    frame_poses       48 multiplications, 20 additions, 6 sin, 6 cos
+
+Arrays      q, qd, qdd, tau (..., n) and X (60,) of one package (NumPy, CuPy, JAX, PyTorch, ...), all float64; results stay on their device.
+            Functions are pure: jax.jit, jax.vmap, jax.grad, torch.func and torch.compile take them as they are.
+            Without a compiler every intermediate array is held: evaluate long records in blocks.
+Signals     entry (k, j) of the regressor is c*signals(q, qd, qdd)[s] for each (k, j, s, c) in ENTRIES, and zero where there is none.
+"""
+
+from array_api_compat import array_namespace
+
+SCHEMA = 1
+NAME = 'tx40'
+SOURCE_SHA256 = 'fb8651f3f1d05f4c7a2e02bfc0e7108b55005147e5eea394276297efb5c70103'
+JOINTS = (1, 2, 3, 4, 5, 6)
+CONSTANTS = {'D3': 0.225, 'RL4': 0.225, 'g': 9.81}
+BASE_PARAMETERS = (
+    'ZZ1R', 'FV1', 'FS1', 'OFFSET1', 'XX2R', 'XY2', 'XZ2R', 'YZ2', 'ZZ2R', 'MX2R', 'MY2', 'FV2', 'FS2', 'OFFSET2',
+    'XX3R', 'XY3', 'XZ3', 'YZ3', 'ZZ3R', 'MX3', 'MY3R', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4R', 'XY4', 'XZ4', 'YZ4',
+    'ZZ4R', 'MX4', 'MY4R', 'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX5R', 'XY5', 'XZ5', 'YZ5', 'ZZ5R', 'MX5', 'MY5R', 'Ia5',
+    'FV5', 'FS5', 'OFFSET5', 'XX6R', 'XY6', 'XZ6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'Ia6', 'FV6', 'FS6', 'OFFSET6', 'FVM6',
+    'FSM6',
+)
+STANDARD_PARAMETERS = (
+    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
+    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
+    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4',
+    'MX4', 'MY4', 'MZ4', 'M4', 'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX5', 'XY5', 'XZ5', 'YY5', 'YZ5', 'ZZ5', 'MX5', 'MY5',
+    'MZ5', 'M5', 'Ia5', 'FV5', 'FS5', 'OFFSET5', 'XX6', 'XY6', 'XZ6', 'YY6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'MZ6', 'M6',
+    'Ia6', 'FV6', 'FS6', 'OFFSET6', 'FVM6', 'FSM6',
+)
+UNITS = {
+    'ZZ1R': 'kg*m**2', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m', 'XX2R': 'kg*m**2', 'XY2': 'kg*m**2',
+    'XZ2R': 'kg*m**2', 'YZ2': 'kg*m**2', 'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m', 'MY2': 'kg*m', 'FV2': 'N*m*s/rad',
+    'FS2': 'N*m', 'OFFSET2': 'N*m', 'XX3R': 'kg*m**2', 'XY3': 'kg*m**2', 'XZ3': 'kg*m**2', 'YZ3': 'kg*m**2',
+    'ZZ3R': 'kg*m**2', 'MX3': 'kg*m', 'MY3R': 'kg*m', 'Ia3': 'kg*m**2', 'FV3': 'N*m*s/rad', 'FS3': 'N*m',
+    'OFFSET3': 'N*m', 'XX4R': 'kg*m**2', 'XY4': 'kg*m**2', 'XZ4': 'kg*m**2', 'YZ4': 'kg*m**2', 'ZZ4R': 'kg*m**2',
+    'MX4': 'kg*m', 'MY4R': 'kg*m', 'Ia4': 'kg*m**2', 'FV4': 'N*m*s/rad', 'FS4': 'N*m', 'OFFSET4': 'N*m',
+    'XX5R': 'kg*m**2', 'XY5': 'kg*m**2', 'XZ5': 'kg*m**2', 'YZ5': 'kg*m**2', 'ZZ5R': 'kg*m**2', 'MX5': 'kg*m',
+    'MY5R': 'kg*m', 'Ia5': 'kg*m**2', 'FV5': 'N*m*s/rad', 'FS5': 'N*m', 'OFFSET5': 'N*m', 'XX6R': 'kg*m**2',
+    'XY6': 'kg*m**2', 'XZ6': 'kg*m**2', 'YZ6': 'kg*m**2', 'ZZ6': 'kg*m**2', 'MX6': 'kg*m', 'MY6': 'kg*m',
+    'Ia6': 'kg*m**2', 'FV6': 'N*m*s/rad', 'FS6': 'N*m', 'OFFSET6': 'N*m', 'FVM6': 'N*m*s/rad', 'FSM6': 'N*m',
+}
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + YY2 + YY3 + D3**2*(M3 + M4 + M5 + M6)', 'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1',
+    'XX2R': 'XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)', 'XY2': 'XY2', 'XZ2R': 'XZ2 - D3*MZ3', 'YZ2': 'YZ2',
+    'ZZ2R': 'ZZ2 + Ia2 + D3**2*(M3 + M4 + M5 + M6)', 'MX2R': 'MX2 + D3*(M3 + M4 + M5 + M6)', 'MY2': 'MY2', 'FV2': 'FV2',
+    'FS2': 'FS2', 'OFFSET2': 'OFFSET2', 'XX3R': 'XX3 - YY3 + YY4 + 2*RL4*MZ4 + RL4**2*(M4 + M5 + M6)', 'XY3': 'XY3',
+    'XZ3': 'XZ3', 'YZ3': 'YZ3', 'ZZ3R': 'ZZ3 + YY4 + 2*RL4*MZ4 + RL4**2*(M4 + M5 + M6)', 'MX3': 'MX3',
+    'MY3R': 'MY3 - MZ4 - RL4*(M4 + M5 + M6)', 'Ia3': 'Ia3', 'FV3': 'FV3', 'FS3': 'FS3', 'OFFSET3': 'OFFSET3',
+    'XX4R': 'XX4 - YY4 + YY5', 'XY4': 'XY4', 'XZ4': 'XZ4', 'YZ4': 'YZ4', 'ZZ4R': 'ZZ4 + YY5', 'MX4': 'MX4',
+    'MY4R': 'MY4 + MZ5', 'Ia4': 'Ia4', 'FV4': 'FV4', 'FS4': 'FS4', 'OFFSET4': 'OFFSET4', 'XX5R': 'XX5 - YY5 + YY6',
+    'XY5': 'XY5', 'XZ5': 'XZ5', 'YZ5': 'YZ5', 'ZZ5R': 'ZZ5 + YY6', 'MX5': 'MX5', 'MY5R': 'MY5 - MZ6', 'Ia5': 'Ia5',
+    'FV5': 'FV5', 'FS5': 'FS5', 'OFFSET5': 'OFFSET5', 'XX6R': 'XX6 - YY6', 'XY6': 'XY6', 'XZ6': 'XZ6', 'YZ6': 'YZ6',
+    'ZZ6': 'ZZ6', 'MX6': 'MX6', 'MY6': 'MY6', 'Ia6': 'Ia6', 'FV6': 'FV6', 'FS6': 'FS6', 'OFFSET6': 'OFFSET6',
+    'FVM6': 'FVM6', 'FSM6': 'FSM6',
+}
+NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'MZ2', 'M2')
+STRUCTURE = tuple(tuple(mark == "x" for mark in row) for row in (  # [k, j]: whether base parameter k acts on joint j
+    "x.....", "x.....", "x.....", "x.....", "xx....", "xx....", "xx....", "xx....", ".x....", ".x....", ".x....",
+    ".x....", ".x....", ".x....", "xxx...", "xxx...", "xxx...", "xxx...", ".xx...", "xxx...", "xxx...", "..x...",
+    "..x...", "..x...", "..x...", "xxxx..", "xxxx..", "xxxx..", "xxxx..", "xxxx..", "xxxx..", "xxxx..", "...x..",
+    "...x..", "...x..", "...x..", "xxxxx.", "xxxxx.", "xxxxx.", "xxxxx.", "xxxxx.", "xxxxx.", "xxxxx.", "....x.",
+    "....x.", "....x.", "....x.", "xxxxxx", "xxxxxx", "xxxxxx", "xxxxxx", "xxxxxx", "xxxxxx", "xxxxxx", "....xx",
+    ".....x", ".....x", ".....x", "....xx", "....xx",
+))
+DRIVES = {  # qm = ratio (q - offset), tau = ratio' (torque_constant * u)
+    'ratio': (
+        (32.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        (0.0, 32.0, 0.0, 0.0, 0.0, 0.0),
+        (0.0, 0.0, 45.0, 0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0, -48.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0, 0.0, 45.0, 0.0),
+        (0.0, 0.0, 0.0, 0.0, 32.0, 32.0),
+    ),
+    'offset': (0.0, -1.5707963267948966, 1.5707963267948966, 0.0, 0.0, 0.0),
+    'torque_constant': (1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
+}
+LIMITS = {
+    'q': ((-3.141592653589793, 3.141592653589793), (-3.752457891787808, 0.6108652381980153), (-0.8377580409572781, 3.979350694547071), (-4.71238898038469, 4.71238898038469), (-2.0943951023931953, 2.33001455141243), (-4.71238898038469, 4.71238898038469)),
+    'qd': (5.009094953223726, 5.009094953223726, 7.504915783575616, 7.155849933176751, 5.585053606381854, 12.217304763960307),
+    'qdd': (27.0, 28.0, 46.0, 55.0, 40.0, 72.0),
+}
+VALUES = {
+    'XX1': 0.107254, 'XY1': 0.000364, 'XZ1': 0.002144, 'YY1': 0.106707, 'YZ1': -0.004288, 'ZZ1': 0.05792625,
+    'MX1': 0.035736, 'MY1': -0.071472, 'MZ1': -0.420265, 'M1': 7.0, 'Ia1': 0.680574, 'FV1': 8.07, 'FS1': 5.78,
+    'OFFSET1': 0.3, 'XX2': 0.017286, 'XY2': -0.001864, 'XZ2': -0.014046, 'YY2': 0.113824, 'YZ2': -0.00055,
+    'ZZ2': 0.110767, 'MX2': 0.46325, 'MY2': 0.018249, 'MZ2': 0.137519, 'M2': 4.56, 'Ia2': 0.5, 'FV2': 5.55, 'FS2': 7.54,
+    'OFFSET2': -0.4, 'XX3': 0.02097455, 'XY3': 0.001414, 'XZ3': 0.000361, 'YY3': 0.011657, 'YZ3': -0.000875,
+    'ZZ3': 0.022362, 'MX3': 0.045, 'MY3': -0.108951, 'MZ3': -0.027746, 'M3': 3.46, 'Ia3': 0.084, 'FV3': 2.24,
+    'FS3': 5.86, 'OFFSET3': 0.2, 'XX4': 0.039568, 'XY4': -2.9e-05, 'XZ4': 0.000503, 'YY4': 0.039121, 'YZ4': 0.001497,
+    'ZZ4': 0.00416, 'MX4': 0.004769, 'MY4': 0.014207, 'MZ4': -0.249544, 'M4': 2.37, 'Ia4': 0.027, 'FV4': 1.13,
+    'FS4': 2.31, 'OFFSET4': 0.096, 'XX5': 0.001863, 'XY5': 2.4e-05, 'XZ5': 7e-06, 'YY5': 0.001082, 'YZ5': -3.6e-05,
+    'ZZ5': 0.001857, 'MX5': -0.002375, 'MY5': 0.011876, 'MZ5': 0.003563, 'M5': 1.19, 'Ia5': 0.053, 'FV5': 2.01,
+    'FS5': 3.78, 'OFFSET5': -0.1, 'XX6': 0.000834, 'XY6': 0.0, 'XZ6': -1.2e-05, 'YY6': 0.000834, 'YZ6': 1.2e-05,
+    'ZZ6': 0.00012, 'MX6': 0.000208, 'MY6': -0.000208, 'MZ6': 0.01245, 'M6': 0.21, 'Ia6': 0.014, 'FV6': 0.721,
+    'FS6': 1.8, 'OFFSET6': 0.166, 'FVM6': 0.7, 'FSM6': 1.6,
+}
+_PATHS = {
+    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
+    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),))),
+    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
+    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),))),
+    6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),))),
+}
+SIGNALS = 136
+ENTRIES = (
+    (0, 0, 0, 1.0), (1, 0, 1, 1.0), (2, 0, 2, 1.0), (3, 0, 3, 1.0), (4, 0, 4, 1.0), (5, 0, 5, -1.0), (6, 0, 6, -1.0),
+    (7, 0, 7, -1.0), (14, 0, 8, 1.0), (15, 0, 9, -1.0), (16, 0, 10, -1.0), (17, 0, 11, -1.0), (19, 0, 12, -1.0),
+    (20, 0, 13, 1.0), (25, 0, 14, 1.0), (26, 0, 15, -1.0), (27, 0, 16, -1.0), (28, 0, 17, -1.0), (29, 0, 18, 1.0),
+    (30, 0, 19, -1.0), (31, 0, 20, -1.0), (36, 0, 21, 1.0), (37, 0, 22, 1.0), (38, 0, 23, -1.0), (39, 0, 24, -1.0),
+    (40, 0, 25, -1.0), (41, 0, 26, -1.0), (42, 0, 27, 1.0), (47, 0, 28, 1.0), (48, 0, 29, -1.0), (49, 0, 30, -1.0),
+    (50, 0, 31, -1.0), (51, 0, 32, 1.0), (52, 0, 33, -1.0), (53, 0, 34, -1.0), (4, 1, 35, -1.0), (5, 1, 36, 1.0),
+    (6, 1, 37, -1.0), (7, 1, 38, -1.0), (8, 1, 39, 1.0), (9, 1, 40, -1.0), (10, 1, 41, 1.0), (11, 1, 42, 1.0),
+    (12, 1, 43, 1.0), (13, 1, 3, 1.0), (14, 1, 44, -1.0), (15, 1, 45, 1.0), (16, 1, 46, -1.0), (17, 1, 47, -1.0),
+    (18, 1, 48, 1.0), (19, 1, 49, -1.0), (20, 1, 50, 1.0), (25, 1, 51, -1.0), (26, 1, 52, 1.0), (27, 1, 53, 1.0),
+    (28, 1, 54, 1.0), (29, 1, 55, 1.0), (30, 1, 56, -1.0), (31, 1, 57, 1.0), (36, 1, 58, -1.0), (37, 1, 59, -1.0),
+    (38, 1, 60, 1.0), (39, 1, 61, 1.0), (40, 1, 62, -1.0), (41, 1, 63, -1.0), (42, 1, 64, -1.0), (47, 1, 65, -1.0),
+    (48, 1, 66, 1.0), (49, 1, 67, 1.0), (50, 1, 68, 1.0), (51, 1, 69, 1.0), (52, 1, 70, -1.0), (53, 1, 71, 1.0),
+    (14, 2, 44, -1.0), (15, 2, 45, 1.0), (16, 2, 46, -1.0), (17, 2, 47, -1.0), (18, 2, 48, 1.0), (19, 2, 72, -1.0),
+    (20, 2, 73, 1.0), (21, 2, 74, 1.0), (22, 2, 75, 1.0), (23, 2, 76, 1.0), (24, 2, 3, 1.0), (25, 2, 51, -1.0),
+    (26, 2, 52, 1.0), (27, 2, 53, 1.0), (28, 2, 54, 1.0), (29, 2, 55, 1.0), (30, 2, 77, -1.0), (31, 2, 78, 1.0),
+    (36, 2, 58, -1.0), (37, 2, 59, -1.0), (38, 2, 60, 1.0), (39, 2, 61, 1.0), (40, 2, 62, -1.0), (41, 2, 79, -1.0),
+    (42, 2, 80, -1.0), (47, 2, 65, -1.0), (48, 2, 66, 1.0), (49, 2, 67, 1.0), (50, 2, 68, 1.0), (51, 2, 69, 1.0),
+    (52, 2, 81, -1.0), (53, 2, 82, 1.0), (25, 3, 83, 1.0), (26, 3, 84, 1.0), (27, 3, 85, -1.0), (28, 3, 86, 1.0),
+    (29, 3, 87, 1.0), (30, 3, 88, -1.0), (31, 3, 89, 1.0), (32, 3, 90, 1.0), (33, 3, 91, 1.0), (34, 3, 92, 1.0),
+    (35, 3, 3, 1.0), (36, 3, 93, 1.0), (37, 3, 94, 1.0), (38, 3, 95, -1.0), (39, 3, 96, -1.0), (40, 3, 97, -1.0),
+    (41, 3, 98, -1.0), (42, 3, 99, 1.0), (47, 3, 100, 1.0), (48, 3, 101, -1.0), (49, 3, 102, -1.0), (50, 3, 103, -1.0),
+    (51, 3, 104, 1.0), (52, 3, 105, -1.0), (53, 3, 106, -1.0), (36, 4, 107, -1.0), (37, 4, 108, 1.0),
+    (38, 4, 109, -1.0), (39, 4, 110, -1.0), (40, 4, 111, 1.0), (41, 4, 112, -1.0), (42, 4, 113, 1.0), (43, 4, 114, 1.0),
+    (44, 4, 115, 1.0), (45, 4, 116, 1.0), (46, 4, 3, 1.0), (47, 4, 117, -1.0), (48, 4, 118, 1.0), (49, 4, 119, 1.0),
+    (50, 4, 120, 1.0), (51, 4, 121, 1.0), (52, 4, 122, -1.0), (53, 4, 123, 1.0), (54, 4, 124, 1.0), (58, 4, 125, 1.0),
+    (59, 4, 126, 1.0), (47, 5, 127, 1.0), (48, 5, 128, 1.0), (49, 5, 129, -1.0), (50, 5, 130, 1.0), (51, 5, 131, 1.0),
+    (52, 5, 132, -1.0), (53, 5, 133, 1.0), (54, 5, 134, 1.0), (55, 5, 125, 1.0), (56, 5, 135, 1.0), (57, 5, 3, 1.0),
+    (58, 5, 115, 1.0), (59, 5, 126, 1.0),
+)
+
+
+def _checked(*arrays):
+    """Raise TypeError unless all arrays belong to one package and hold float64."""
+    xp = array_namespace(*arrays)
+    for x in arrays:
+        if x.dtype != xp.float64:
+            raise TypeError(f"{x.dtype}; expected float64 (JAX: set jax_enable_x64 before arrays are made)")
+
+
+def _sign(x):
+    """sign(x), NaN where x is; unlike that of some packages it maps (torch.func.vmap)."""
+    xp = array_namespace(x)
+    return xp.where(x > 0.0, 1.0, xp.where(x < 0.0, -1.0, 0.0*x))
+
+
+def base_parameters(standard, *, D3=0.225, RL4=0.225, g=9.81):
+    """X, shape (60,), from the 86 standard parameters: a mapping of names to arrays, or one array in the order of STANDARD_PARAMETERS."""
+    if hasattr(standard, "keys"):
+        standard = [standard[name] for name in STANDARD_PARAMETERS]
+    else:
+        standard = [standard[k] for k in range(86)]
+    _checked(*standard)
+    xp = array_namespace(*standard)
+    (
+        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
+        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
+        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5,
+        M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, FVM6, FSM6
+    ) = standard
+    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + D3**2*(M3 + M4 + M5 + M6)
+    XX2R = XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)
+    XZ2R = XZ2 - D3*MZ3
+    ZZ2R = ZZ2 + Ia2 + D3**2*(M3 + M4 + M5 + M6)
+    MX2R = MX2 + D3*(M3 + M4 + M5 + M6)
+    XX3R = XX3 - YY3 + YY4 + 2*RL4*MZ4 + RL4**2*(M4 + M5 + M6)
+    ZZ3R = ZZ3 + YY4 + 2*RL4*MZ4 + RL4**2*(M4 + M5 + M6)
+    MY3R = MY3 - MZ4 - RL4*(M4 + M5 + M6)
+    XX4R = XX4 - YY4 + YY5
+    ZZ4R = ZZ4 + YY5
+    MY4R = MY4 + MZ5
+    XX5R = XX5 - YY5 + YY6
+    ZZ5R = ZZ5 + YY6
+    MY5R = MY5 - MZ6
+    XX6R = XX6 - YY6
+    return xp.stack([
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2R, YZ2, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R, XY3, XZ3, YZ3, ZZ3R, MX3,
+        MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5,
+        ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, FVM6, FSM6,
+    ])
+
+
+def signals(q, qd, qdd, *, D3=0.225, RL4=0.225, g=9.81):
+    """The 136 distinct signals of the regressor, shape (136, ...): all that filters and decimation of its columns need."""
+    _checked(q, qd, qdd)
+    xp = array_namespace(q, qd, qdd)
+    return xp.stack(_signals_block(q, qd, qdd, D3, RL4, g), axis=0)
+
+
+def _store(q, qd, qdd, D3, RL4, g):
+    """Entries (b, n), row by row, shape (360, ...)."""
+    _checked(q, qd, qdd)
+    xp = array_namespace(q, qd, qdd)
+    found = _signals_block(q, qd, qdd, D3, RL4, g)
+    rows = [xp.zeros_like(q[..., 0])] * 360
+    for k, j, s, c in ENTRIES:
+        rows[6*k + j] = found[s] if c == 1.0 else c*found[s]
+    return xp.stack(rows, axis=0)
+
+
+def regressor(q, qd, qdd, *, D3=0.225, RL4=0.225, g=9.81):
+    """D of Gamma = D X, shape (..., 6, 60); q, qd, qdd of shape (..., 6), rad or m and seconds."""
+    S = _store(q, qd, qdd, D3, RL4, g)
+    xp = array_namespace(S)
+    return xp.moveaxis(xp.reshape(S, (60, 6, *q.shape[:-1])), (1, 0), (-2, -1))
+
+
+def observation_matrix(q, qd, qdd, *, D3=0.225, RL4=0.225, g=9.81):
+    """W of Y = W X + rho, shape (6*N, 60), rows joint-major."""
+    S = _store(q, qd, qdd, D3, RL4, g)
+    xp = array_namespace(S)
+    return xp.permute_dims(xp.reshape(S, (60, -1)), (1, 0))
+
+
+def inverse_dynamics(q, qd, qdd, X, *, D3=0.225, RL4=0.225, g=9.81):
+    """Joint torques Gamma, shape (..., 6), of base parameters X, shape (60,)."""
+    _checked(q, qd, qdd, X)
+    xp = array_namespace(q, qd, qdd, X)
+    return xp.stack(_inverse_dynamics_block(q, qd, qdd, X, D3, RL4, g), axis=-1)
+
+
+def inertia_matrix(q, X, *, D3=0.225, RL4=0.225, g=9.81):
+    """A(q), shape (..., 6, 6), actuators included."""
+    _checked(q, X)
+    xp = array_namespace(q, X)
+    return xp.reshape(xp.stack(_inertia_matrix_block(q, X, D3, RL4, g), axis=-1), (*q.shape, 6))
+
+
+def bias(q, qd, X, *, D3=0.225, RL4=0.225, g=9.81):
+    """Gamma at qdd = 0, shape (..., 6): Coriolis, centrifugal, gravity, friction and offset."""
+    _checked(q, qd, X)
+    xp = array_namespace(q, qd, X)
+    return xp.stack(_bias_block(q, qd, X, D3, RL4, g), axis=-1)
+
+
+def gravity(q, X, *, D3=0.225, RL4=0.225, g=9.81):
+    """Gamma at rest without friction, shape (..., 6): gravity, offset and springs (a base parameter may mix them)."""
+    _checked(q, X)
+    xp = array_namespace(q, X)
+    return xp.stack(_gravity_block(q, X, D3, RL4, g), axis=-1)
+
+
+def forward_dynamics(q, qd, tau, X, *, D3=0.225, RL4=0.225, g=9.81):
+    """qdd = A(q)**-1 (tau - bias), shape (..., 6)."""
+    _checked(q, qd, tau, X)
+    xp = array_namespace(q, qd, tau, X)
+    A, H = inertia_matrix(q, X, D3=D3, RL4=RL4, g=g), bias(q, qd, X, D3=D3, RL4=RL4, g=g)
+    return xp.linalg.solve(A, (tau - H)[..., None])[..., 0]
+
+
+def frame_poses(q, *, D3=0.225, RL4=0.225, g=9.81):
+    """Homogeneous transform of every frame j in frame 0, shape (..., 6, 4, 4), at index j - 1."""
+    _checked(q)
+    xp = array_namespace(q)
+    return xp.reshape(xp.stack(_frame_poses_block(q, D3, RL4, g), axis=-1), (*q.shape[:-1], 6, 4, 4))
+
+
+def jacobian(q, *, frame=6, D3=0.225, RL4=0.225, g=9.81):
+    """J, shape (..., 6, 6): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
+    T = frame_poses(q, D3=D3, RL4=RL4, g=g)
+    xp = array_namespace(T)
+    still = xp.zeros_like(T[..., 0, :3, 2])
+    linear, angular = [still] * 6, [still] * 6
+    P = T[..., (6 if frame is None else frame) - 1, :3, 3]
+    for j, sigma, rates in _PATHS[6 if frame is None else frame]:
+        z = T[..., j - 1, :3, 2]
+        v, w = (z, still) if sigma else (xp.linalg.cross(z, P - T[..., j - 1, :3, 3]), z)
+        for k, rate in rates:
+            linear[k], angular[k] = linear[k] + rate*v, angular[k] + rate*w
+    return xp.concat([xp.stack(linear, axis=-1), xp.stack(angular, axis=-1)], axis=-2)
+
+
+def _signals_block(q, qd, qdd, D3, RL4, g):
+    """The distinct signals of the regressor, (...) each."""
+    xp = array_namespace(q)
+    # Inputs
+    zero = xp.zeros_like(q[..., 0])
+    q2 = q[..., 1]
+    q3 = q[..., 2]
+    q4 = q[..., 3]
+    q5 = q[..., 4]
+    q6 = q[..., 5]
+    QP1 = qd[..., 0]
+    QP2 = qd[..., 1]
+    QP3 = qd[..., 2]
+    QP4 = qd[..., 3]
+    QP5 = qd[..., 4]
+    QP6 = qd[..., 5]
+    QDP1 = qdd[..., 0]
+    QDP2 = qdd[..., 1]
+    QDP3 = qdd[..., 2]
+    QDP4 = qdd[..., 3]
+    QDP5 = qdd[..., 4]
+    QDP6 = qdd[..., 5]
+    # Trigonometry
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
+    th23 = q2 + q3
+    C23 = xp.cos(th23)
+    S23 = xp.sin(th23)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    U232 = S2*QDP1
+    U132 = -C2*QDP1
+    DV232 = QP2*W22
+    WP12 = DV232 - U232
+    DV132 = QP2*W12
+    WP22 = U132 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U122 = DV122 - QDP2
+    U212 = QDP2 + DV122
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 3
+    W33 = QP2 + QP3
+    WP33 = QDP2 + QDP3
+    W13 = -S23*QP1
+    W23 = -C23*QP1
+    U233 = S23*QDP1
+    U133 = -C23*QDP1
+    DV233 = W33*W23
+    WP13 = DV233 - U233
+    DV133 = W33*W13
+    WP23 = U133 - DV133
+    DV113 = W13**2
+    DV123 = W13*W23
+    DV223 = W23**2
+    DV333 = W33**2
+    DW233 = DV223 - DV333
+    DW313 = DV333 - DV113
+    DW123 = DV113 - DV223
+    U113 = -DV223 - DV333
+    U123 = DV123 - WP33
+    U213 = WP33 + DV123
+    U223 = -DV113 - DV333
+    U313 = DV133 - WP23
+    U323 = DV233 + WP13
+    VSP33 = D3*U312
+    VSP13 = VP12 + D3*U112
+    VSP23 = VP22 + D3*U212
+    VP13 = C3*VSP13 + S3*VSP23
+    VP23 = C3*VSP23 - S3*VSP13
+    # Link 4
+    W14 = C4*W13 + S4*W33
+    W24 = C4*W33 - S4*W13
+    W34 = QP4 - W23
+    WP14 = C4*WP13 + S4*WP33 + QP4*W24
+    WP24 = C4*WP33 - S4*WP13 - QP4*W14
+    WP34 = QDP4 - WP23
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = DV124 - WP34
+    U134 = WP24 + DV134
+    U214 = WP34 + DV124
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VSP14 = VP13 - RL4*U123
+    VSP24 = VP23 - RL4*U223
+    VSP34 = VSP33 - RL4*U323
+    VP14 = C4*VSP14 + S4*VSP34
+    VP24 = C4*VSP34 - S4*VSP14
+    # Link 5
+    W15 = C5*W14 - S5*W34
+    W25 = -C5*W34 - S5*W14
+    W35 = QP5 + W24
+    WP15 = C5*WP14 + QP5*W25 - S5*WP34
+    WP25 = -C5*WP34 - S5*WP14 - QP5*W15
+    WP35 = QDP5 + WP24
+    DV115 = W15**2
+    DV125 = W15*W25
+    DV135 = W15*W35
+    DV225 = W25**2
+    DV235 = W25*W35
+    DV335 = W35**2
+    DW235 = DV225 - DV335
+    DW315 = DV335 - DV115
+    DW125 = DV115 - DV225
+    U115 = -DV225 - DV335
+    U125 = DV125 - WP35
+    U135 = WP25 + DV135
+    U215 = WP35 + DV125
+    U225 = -DV115 - DV335
+    U235 = DV235 - WP15
+    U315 = DV135 - WP25
+    U325 = WP15 + DV235
+    VP15 = C5*VP14 + S5*VSP24
+    VP25 = C5*VSP24 - S5*VP14
+    # Link 6
+    W16 = C6*W15 + S6*W35
+    W26 = C6*W35 - S6*W15
+    W36 = QP6 - W25
+    WP16 = C6*WP15 + S6*WP35 + QP6*W26
+    WP26 = C6*WP35 - S6*WP15 - QP6*W16
+    WP36 = QDP6 - WP25
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV136 = W16*W36
+    DV226 = W26**2
+    DV236 = W26*W36
+    DV336 = W36**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = DV126 - WP36
+    U136 = WP26 + DV136
+    U216 = WP36 + DV126
+    U226 = -DV116 - DV336
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = WP16 + DV236
+    VP16 = C6*VP15 + S6*VP24
+    VP26 = C6*VP24 - S6*VP15
+    # Joint axes Z and velocities V seen from link 3
+    V331 = D3*C2
+    V132 = D3*S3
+    V232 = D3*C3
+    # Joint axes Z and velocities V seen from link 4
+    Z141 = -S23*C4
+    Z241 = S23*S4
+    VS341 = V331 + RL4*S23
+    V141 = S4*VS341
+    V241 = C4*VS341
+    VS142 = RL4 + V132
+    V142 = C4*VS142
+    V242 = -S4*VS142
+    V143 = RL4*C4
+    V243 = -RL4*S4
+    # Joint axes Z and velocities V seen from link 5
+    Z151 = C5*Z141 - C23*S5
+    Z251 = -C23*C5 - S5*Z141
+    V151 = C5*V141
+    V251 = -S5*V141
+    Z152 = S4*C5
+    Z252 = -S4*S5
+    V152 = C5*V142 + S5*V232
+    V252 = C5*V232 - S5*V142
+    V153 = C5*V143
+    V253 = -S5*V143
+    # Joint axes Z and velocities V seen from link 6
+    Z161 = C6*Z151 + S6*Z241
+    Z261 = C6*Z241 - S6*Z151
+    V161 = C6*V151 + S6*V241
+    V261 = C6*V241 - S6*V151
+    Z162 = C6*Z152 + C4*S6
+    Z262 = C4*C6 - S6*Z152
+    V162 = C6*V152 + S6*V242
+    V262 = C6*V242 - S6*V152
+    V163 = C6*V153 + S6*V243
+    V263 = C6*V243 - S6*V153
+    Z164 = -S5*C6
+    Z264 = S5*S6
+    # Contributions that several joints share
+    DV134Z241 = DV134*Z241
+    C4DV134 = C4*DV134
+    DN2XX4 = S4*WP14 + C4DV134
+    DN2XY4 = C4*U324 - S4*U314
+    DN2XZ4 = S4*U214 + C4*DW314
+    DN2YZ4 = S4*DW234 - C4*U124
+    DN2ZZ4 = S4*DV234 - C4DV134
+    DN2MX4 = C4*VSP24
+    DN2MY4 = -S4*VSP24
+    DV135Z251 = DV135*Z251
+    DV135Z252 = DV135*Z252
+    DN2XX5 = WP15*Z152 + DV135Z252 - C4*DV125
+    C5DV135 = C5*DV135
+    DN2XY5 = U325*Z252 + C4*DW125 - U315*Z152
+    DN2XZ5 = U215*Z152 + DW315*Z252 - C4*U235
+    DN2YZ5 = DW235*Z152 + C4*U135 - U125*Z252
+    DN2ZZ5 = DV235*Z152 + C4*WP35 - DV135Z252
+    DN2MX5 = C4*VP25 - VP24*Z252
+    DN2MY5 = VP24*Z152 - C4*VP15
+    DV136Z261 = DV136*Z261
+    DV136Z262 = DV136*Z262
+    DN2XX6 = WP16*Z162 + DV136Z262 + DV126*Z252
+    DV136Z264 = DV136*Z264
+    C6DV136 = C6*DV136
+    DN2XY6 = U326*Z262 - U316*Z162 - DW126*Z252
+    DN2XZ6 = U216*Z162 + DW316*Z262 + U236*Z252
+    DN2YZ6 = DW236*Z162 - U126*Z262 - U136*Z252
+    DN2ZZ6 = DV236*Z162 - DV136Z262 - WP36*Z252
+    DN2MX6 = VP25*Z262 - VP26*Z252
+    DN2MY6 = VP16*Z252 - VP25*Z162
+    QP56 = QP5 + QP6
+    signQP56 = _sign(QP56)
+    # Results
+    return (
+        QDP1,                                                       # 0: DG1ZZ1
+        QP1,                                                        # 1: DG1FV1
+        _sign(QP1),                                                 # 2: DG1FS1
+        1.0 + zero,                                                 # 3: DG1OFFSET1
+        -S2*WP12 - C2*DV132,                                        # 4: DG1XX2
+        C2*U322 - S2*U312,                                          # 5: DG1XY2, sign apart
+        S2*U212 + C2*DW312,                                         # 6: DG1XZ2, sign apart
+        S2*DW232 - C2*U122,                                         # 7: DG1YZ2, sign apart
+        -S23*WP13 - C23*DV133,                                      # 8: DG1XX3
+        C23*U323 - S23*U313,                                        # 9: DG1XY3, sign apart
+        S23*U213 + C23*DW313,                                       # 10: DG1XZ3, sign apart
+        S23*DW233 - C23*U123,                                       # 11: DG1YZ3, sign apart
+        -C23*VSP33 - U313*V331,                                     # 12: DG1MX3, sign apart
+        U323*V331 - S23*VSP33,                                      # 13: DG1MY3
+        WP14*Z141 + DV134Z241 - C23*DV124,                          # 14: DG1XX4
+        U314*Z141 - U324*Z241 - C23*DW124,                          # 15: DG1XY4, sign apart
+        C23*U234 - U214*Z141 - DW314*Z241,                          # 16: DG1XZ4, sign apart
+        U124*Z241 - DW234*Z141 - C23*U134,                          # 17: DG1YZ4, sign apart
+        DV234*Z141 + C23*WP34 - DV134Z241,                          # 18: DG1ZZ4
+        -VSP24*Z241 - C23*VP24 - U114*V141 - U214*V241,             # 19: DG1MX4, sign apart
+        VSP24*Z141 + C23*VP14 - U124*V141 - U224*V241,              # 20: DG1MY4, sign apart
+        WP15*Z151 + DV135Z251 - DV125*Z241,                         # 21: DG1XX5
+        U325*Z251 + DW125*Z241 - U315*Z151,                         # 22: DG1XY5
+        U235*Z241 - U215*Z151 - DW315*Z251,                         # 23: DG1XZ5, sign apart
+        U125*Z251 - DW235*Z151 - U135*Z241,                         # 24: DG1YZ5, sign apart
+        DV135Z251 - DV235*Z151 - WP35*Z241,                         # 25: DG1ZZ5, sign apart
+        VP24*Z251 - VP25*Z241 - U115*V151 - U215*V251 - U315*V241,  # 26: DG1MX5, sign apart
+        VP24*Z151 + U125*V151 + U225*V251 + U325*V241 - VP15*Z241,  # 27: DG1MY5
+        WP16*Z161 + DV136Z261 + DV126*Z251,                         # 28: DG1XX6
+        U316*Z161 + DW126*Z251 - U326*Z261,                         # 29: DG1XY6, sign apart
+        -U216*Z161 - DW316*Z261 - U236*Z251,                        # 30: DG1XZ6, sign apart
+        U126*Z261 + U136*Z251 - DW236*Z161,                         # 31: DG1YZ6, sign apart
+        DV236*Z161 - DV136Z261 - WP36*Z251,                         # 32: DG1ZZ6
+        VP26*Z251 + U316*V251 - VP25*Z261 - U116*V161 - U216*V261,  # 33: DG1MX6, sign apart
+        VP25*Z161 + U326*V251 - VP16*Z251 - U126*V161 - U226*V261,  # 34: DG1MY6, sign apart
+        DV122,                                                      # 35: DG2XX2, sign apart
+        DW122,                                                      # 36: DG2XY2
+        U232,                                                       # 37: DG2XZ2, sign apart
+        -U132,                                                      # 38: DG2YZ2, sign apart
+        QDP2,                                                       # 39: DG2ZZ2
+        -VP22,                                                      # 40: DG2MX2, sign apart
+        -VP12,                                                      # 41: DG2MY2
+        QP2,                                                        # 42: DG2FV2
+        _sign(QP2),                                                 # 43: DG2FS2
+        DV123,                                                      # 44: DG2XX3, sign apart
+        DW123,                                                      # 45: DG2XY3
+        U233,                                                       # 46: DG2XZ3, sign apart
+        -U133,                                                      # 47: DG2YZ3, sign apart
+        WP33,                                                       # 48: DG2ZZ3
+        -VP23 - U113*V132 - U213*V232,                              # 49: DG2MX3, sign apart
+        U123*V132 + U223*V232 - VP13,                               # 50: DG2MY3
+        -DN2XX4,                                                    # 51: DG2XX4, sign apart
+        DN2XY4,                                                     # 52: DG2XY4
+        DN2XZ4,                                                     # 53: DG2XZ4
+        DN2YZ4,                                                     # 54: DG2YZ4
+        DN2ZZ4,                                                     # 55: DG2ZZ4
+        U314*V232 - DN2MX4 - U114*V142 - U214*V242,                 # 56: DG2MX4, sign apart
+        DN2MY4 + U124*V142 + U224*V242 - U324*V232,                 # 57: DG2MY4
+        -DN2XX5,                                                    # 58: DG2XX5, sign apart
+        -DN2XY5,                                                    # 59: DG2XY5, sign apart
+        DN2XZ5,                                                     # 60: DG2XZ5
+        DN2YZ5,                                                     # 61: DG2YZ5
+        -DN2ZZ5,                                                    # 62: DG2ZZ5, sign apart
+        -DN2MX5 - U115*V152 - U215*V252 - U315*V242,                # 63: DG2MX5, sign apart
+        -DN2MY5 - U125*V152 - U225*V252 - U325*V242,                # 64: DG2MY5, sign apart
+        -DN2XX6,                                                    # 65: DG2XX6, sign apart
+        DN2XY6,                                                     # 66: DG2XY6
+        DN2XZ6,                                                     # 67: DG2XZ6
+        DN2YZ6,                                                     # 68: DG2YZ6
+        DN2ZZ6,                                                     # 69: DG2ZZ6
+        U316*V252 - DN2MX6 - U116*V162 - U216*V262,                 # 70: DG2MX6, sign apart
+        DN2MY6 + U126*V162 + U226*V262 - U326*V252,                 # 71: DG2MY6
+        -VP23,                                                      # 72: DG3MX3, sign apart
+        -VP13,                                                      # 73: DG3MY3
+        QDP3,                                                       # 74: DG3Ia3
+        QP3,                                                        # 75: DG3FV3
+        _sign(QP3),                                                 # 76: DG3FS3
+        -DN2MX4 - U114*V143 - U214*V243,                            # 77: DG3MX4, sign apart
+        DN2MY4 + U124*V143 + U224*V243,                             # 78: DG3MY4
+        -DN2MX5 - U115*V153 - U215*V253 - U315*V243,                # 79: DG3MX5, sign apart
+        -DN2MY5 - U125*V153 - U225*V253 - U325*V243,                # 80: DG3MY5, sign apart
+        U316*V253 - DN2MX6 - U116*V163 - U216*V263,                 # 81: DG3MX6, sign apart
+        DN2MY6 + U126*V163 + U226*V263 - U326*V253,                 # 82: DG3MY6
+        -DV124,                                                     # 83: DG4XX4
+        DW124,                                                      # 84: DG4XY4
+        U234,                                                       # 85: DG4XZ4, sign apart
+        U134,                                                       # 86: DG4YZ4
+        WP34,                                                       # 87: DG4ZZ4
+        -VP24,                                                      # 88: DG4MX4, sign apart
+        -VP14,                                                      # 89: DG4MY4
+        QDP4,                                                       # 90: DG4Ia4
+        QP4,                                                        # 91: DG4FV4
+        _sign(QP4),                                                 # 92: DG4FS4
+        -S5*WP15 - C5DV135,                                         # 93: DG4XX5
+        S5*U315 - C5*U325,                                          # 94: DG4XY5
+        S5*U215 + C5*DW315,                                         # 95: DG4XZ5, sign apart
+        S5*DW235 - C5*U125,                                         # 96: DG4YZ5, sign apart
+        S5*DV235 - C5DV135,                                         # 97: DG4ZZ5, sign apart
+        -C5*VP24,                                                   # 98: DG4MX5, sign apart
+        -S5*VP24,                                                   # 99: DG4MY5
+        WP16*Z164 + DV136Z264 - C5*DV126,                           # 100: DG4XX6
+        U316*Z164 - U326*Z264 - C5*DW126,                           # 101: DG4XY6, sign apart
+        C5*U236 - U216*Z164 - DW316*Z264,                           # 102: DG4XZ6, sign apart
+        U126*Z264 - DW236*Z164 - C5*U136,                           # 103: DG4YZ6, sign apart
+        DV236*Z164 + C5*WP36 - DV136Z264,                           # 104: DG4ZZ6
+        -VP25*Z264 - C5*VP26,                                       # 105: DG4MX6, sign apart
+        VP25*Z164 + C5*VP16,                                        # 106: DG4MY6, sign apart
+        DV125,                                                      # 107: DG5XX5, sign apart
+        DW125,                                                      # 108: DG5XY5
+        U235,                                                       # 109: DG5XZ5, sign apart
+        -U135,                                                      # 110: DG5YZ5, sign apart
+        WP35,                                                       # 111: DG5ZZ5
+        -VP25,                                                      # 112: DG5MX5, sign apart
+        -VP15,                                                      # 113: DG5MY5
+        QDP5,                                                       # 114: DG5Ia5
+        QP5,                                                        # 115: DG5FV5
+        _sign(QP5),                                                 # 116: DG5FS5
+        -S6*WP16 - C6DV136,                                         # 117: DG5XX6, sign apart
+        C6*U326 - S6*U316,                                          # 118: DG5XY6
+        S6*U216 + C6*DW316,                                         # 119: DG5XZ6
+        S6*DW236 - C6*U126,                                         # 120: DG5YZ6
+        S6*DV236 - C6DV136,                                         # 121: DG5ZZ6
+        -C6*VP25,                                                   # 122: DG5MX6, sign apart
+        -S6*VP25,                                                   # 123: DG5MY6
+        QDP6,                                                       # 124: DG5Ia6
+        QP6,                                                        # 125: DG5FVM6
+        signQP56,                                                   # 126: DG5FSM6
+        -DV126,                                                     # 127: DG6XX6
+        DW126,                                                      # 128: DG6XY6
+        U236,                                                       # 129: DG6XZ6, sign apart
+        U136,                                                       # 130: DG6YZ6
+        WP36,                                                       # 131: DG6ZZ6
+        -VP26,                                                      # 132: DG6MX6, sign apart
+        -VP16,                                                      # 133: DG6MY6
+        QDP5 + QDP6,                                                # 134: DG6Ia6
+        _sign(QP6),                                                 # 135: DG6FS6
+    )
+
+
+def _inverse_dynamics_block(q, qd, qdd, X, D3, RL4, g):
+    """Gamma of each joint."""
+    xp = array_namespace(q)
+    # Inputs
+    q2 = q[..., 1]
+    q3 = q[..., 2]
+    q4 = q[..., 3]
+    q5 = q[..., 4]
+    q6 = q[..., 5]
+    QP1 = qd[..., 0]
+    QP2 = qd[..., 1]
+    QP3 = qd[..., 2]
+    QP4 = qd[..., 3]
+    QP5 = qd[..., 4]
+    QP6 = qd[..., 5]
+    QDP1 = qdd[..., 0]
+    QDP2 = qdd[..., 1]
+    QDP3 = qdd[..., 2]
+    QDP4 = qdd[..., 3]
+    QDP5 = qdd[..., 4]
+    QDP6 = qdd[..., 5]
+    ZZ1R = X[0]
+    FV1 = X[1]
+    FS1 = X[2]
+    OFFSET1 = X[3]
+    XX2R = X[4]
+    XY2 = X[5]
+    XZ2R = X[6]
+    YZ2 = X[7]
+    ZZ2R = X[8]
+    MX2R = X[9]
+    MY2 = X[10]
+    FV2 = X[11]
+    FS2 = X[12]
+    OFFSET2 = X[13]
+    XX3R = X[14]
+    XY3 = X[15]
+    XZ3 = X[16]
+    YZ3 = X[17]
+    ZZ3R = X[18]
+    MX3 = X[19]
+    MY3R = X[20]
+    Ia3 = X[21]
+    FV3 = X[22]
+    FS3 = X[23]
+    OFFSET3 = X[24]
+    XX4R = X[25]
+    XY4 = X[26]
+    XZ4 = X[27]
+    YZ4 = X[28]
+    ZZ4R = X[29]
+    MX4 = X[30]
+    MY4R = X[31]
+    Ia4 = X[32]
+    FV4 = X[33]
+    FS4 = X[34]
+    OFFSET4 = X[35]
+    XX5R = X[36]
+    XY5 = X[37]
+    XZ5 = X[38]
+    YZ5 = X[39]
+    ZZ5R = X[40]
+    MX5 = X[41]
+    MY5R = X[42]
+    Ia5 = X[43]
+    FV5 = X[44]
+    FS5 = X[45]
+    OFFSET5 = X[46]
+    XX6R = X[47]
+    XY6 = X[48]
+    XZ6 = X[49]
+    YZ6 = X[50]
+    ZZ6 = X[51]
+    MX6 = X[52]
+    MY6 = X[53]
+    Ia6 = X[54]
+    FV6 = X[55]
+    FS6 = X[56]
+    OFFSET6 = X[57]
+    FVM6 = X[58]
+    FSM6 = X[59]
+    # Trigonometry
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
+    th23 = q2 + q3
+    C23 = xp.cos(th23)
+    S23 = xp.sin(th23)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    DV232 = QP2*W22
+    WP12 = DV232 - S2*QDP1
+    DV132 = QP2*W12
+    WP22 = -C2*QDP1 - DV132
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U122 = DV122 - QDP2
+    U132 = DV132 + WP22
+    U212 = QDP2 + DV122
+    U232 = DV232 - WP12
+    U312 = DV132 - WP22
+    U322 = DV232 + WP12
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 3
+    W33 = QP2 + QP3
+    WP33 = QDP2 + QDP3
+    W13 = -S23*QP1
+    W23 = -C23*QP1
+    DV233 = W33*W23
+    WP13 = DV233 - S23*QDP1
+    DV133 = W33*W13
+    WP23 = -C23*QDP1 - DV133
+    DV113 = W13**2
+    DV123 = W13*W23
+    DV223 = W23**2
+    DV333 = W33**2
+    DW233 = DV223 - DV333
+    DW313 = DV333 - DV113
+    DW123 = DV113 - DV223
+    U113 = -DV223 - DV333
+    U123 = DV123 - WP33
+    U133 = DV133 + WP23
+    U213 = WP33 + DV123
+    U223 = -DV113 - DV333
+    U233 = DV233 - WP13
+    U313 = DV133 - WP23
+    U323 = DV233 + WP13
+    VSP33 = D3*U312
+    VSP13 = VP12 + D3*U112
+    VSP23 = VP22 + D3*U212
+    VP13 = C3*VSP13 + S3*VSP23
+    VP23 = C3*VSP23 - S3*VSP13
+    # Link 4
+    W14 = C4*W13 + S4*W33
+    W24 = C4*W33 - S4*W13
+    W34 = QP4 - W23
+    WP14 = C4*WP13 + S4*WP33 + QP4*W24
+    WP24 = C4*WP33 - S4*WP13 - QP4*W14
+    WP34 = QDP4 - WP23
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = DV124 - WP34
+    U134 = WP24 + DV134
+    U214 = WP34 + DV124
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VSP14 = VP13 - RL4*U123
+    VSP24 = VP23 - RL4*U223
+    VSP34 = VSP33 - RL4*U323
+    VP14 = C4*VSP14 + S4*VSP34
+    VP24 = C4*VSP34 - S4*VSP14
+    # Link 5
+    W15 = C5*W14 - S5*W34
+    W25 = -C5*W34 - S5*W14
+    W35 = QP5 + W24
+    WP15 = C5*WP14 + QP5*W25 - S5*WP34
+    WP25 = -C5*WP34 - S5*WP14 - QP5*W15
+    WP35 = QDP5 + WP24
+    DV115 = W15**2
+    DV125 = W15*W25
+    DV135 = W15*W35
+    DV225 = W25**2
+    DV235 = W25*W35
+    DV335 = W35**2
+    DW235 = DV225 - DV335
+    DW315 = DV335 - DV115
+    DW125 = DV115 - DV225
+    U115 = -DV225 - DV335
+    U125 = DV125 - WP35
+    U135 = WP25 + DV135
+    U215 = WP35 + DV125
+    U225 = -DV115 - DV335
+    U235 = DV235 - WP15
+    U315 = DV135 - WP25
+    U325 = WP15 + DV235
+    VP15 = C5*VP14 + S5*VSP24
+    VP25 = C5*VSP24 - S5*VP14
+    # Link 6
+    W16 = C6*W15 + S6*W35
+    W26 = C6*W35 - S6*W15
+    W36 = QP6 - W25
+    WP16 = C6*WP15 + S6*WP35 + QP6*W26
+    WP26 = C6*WP35 - S6*WP15 - QP6*W16
+    WP36 = QDP6 - WP25
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV136 = W16*W36
+    DV226 = W26**2
+    DV236 = W26*W36
+    DV336 = W36**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = DV126 - WP36
+    U136 = WP26 + DV136
+    U216 = WP36 + DV126
+    U226 = -DV116 - DV336
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = WP16 + DV236
+    VP16 = C6*VP15 + S6*VP24
+    VP26 = C6*VP24 - S6*VP15
+    # Joint 6
+    F16 = MX6*U116 + MY6*U126
+    F26 = MX6*U216 + MY6*U226
+    F36 = MX6*U316 + MY6*U326
+    N16 = XX6R*WP16 + ZZ6*DV236 + YZ6*DW236 + XZ6*U216 - XY6*U316 - MY6*VP25
+    N26 = (XX6R - ZZ6)*DV136 + XZ6*DW316 + XY6*U326 + MX6*VP25 - YZ6*U126
+    N36 = ZZ6*WP36 + XY6*DW126 + YZ6*U136 + MX6*VP26 - XX6R*DV126 - XZ6*U236 - MY6*VP16
+    FDI16 = C6*F16 - S6*F26
+    FDI36 = S6*F16 + C6*F26
+    # Joint 5
+    F15 = MX5*U115 + MY5R*U125
+    F25 = MX5*U215 + MY5R*U225
+    F35 = MX5*U315 + MY5R*U325
+    E15 = FDI16 + F15
+    E25 = F25 - F36
+    E35 = FDI36 + F35
+    N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VP24 - XY5*U315
+    N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VP24
+    N35 = ZZ5R*WP35 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
+    NE15 = C6*N16 + N15 - S6*N26
+    NE25 = N25 - N36
+    NE35 = S6*N16 + C6*N26 + N35
+    FDI15 = C5*E15 - S5*E25
+    FDI35 = -S5*E15 - C5*E25
+    # Joint 4
+    F14 = MX4*U114 + MY4R*U124
+    F24 = MX4*U214 + MY4R*U224
+    F34 = MX4*U314 + MY4R*U324
+    E14 = FDI15 + F14
+    E24 = E35 + F24
+    E34 = FDI35 + F34
+    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4*U314 - MY4R*VSP24
+    N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4*U324 + MX4*VSP24 - YZ4*U124
+    N34 = ZZ4R*WP34 + XY4*DW124 + YZ4*U134 + MX4*VP24 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
+    NE14 = C5*NE15 + N14 - S5*NE25
+    NE24 = NE35 + N24
+    NE34 = N34 - S5*NE15 - C5*NE25
+    FDI14 = C4*E14 - S4*E24
+    FDI34 = S4*E14 + C4*E24
+    # Joint 3
+    F13 = MX3*U113 + MY3R*U123
+    F23 = MX3*U213 + MY3R*U223
+    F33 = MX3*U313 + MY3R*U323
+    E13 = FDI14 + F13
+    E23 = F23 - E34
+    E33 = FDI34 + F33
+    N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3*DW233 + XZ3*U213 + MY3R*VSP33 - XY3*U313
+    N23 = (XX3R - ZZ3R)*DV133 + XZ3*DW313 + XY3*U323 - YZ3*U123 - MX3*VSP33
+    N33 = ZZ3R*WP33 + XY3*DW123 + YZ3*U133 + MX3*VP23 - XX3R*DV123 - XZ3*U233 - MY3R*VP13
+    NE13 = C4*NE14 + N13 - S4*NE24 - RL4*FDI34
+    NE23 = N23 - NE34
+    NE33 = S4*NE14 + C4*NE24 + RL4*FDI14 + N33
+    FDI23 = S3*E13 + C3*E23
+    # Joint 2
+    N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2*DW232 + XZ2R*U212 - XY2*U312
+    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2*U322 - YZ2*U122
+    N32 = ZZ2R*QDP2 + XY2*DW122 + YZ2*U132 + MX2R*VP22 - XX2R*DV122 - XZ2R*U232 - MY2*VP12
+    NE12 = C3*NE13 + N12 - S3*NE23
+    NE22 = S3*NE13 + C3*NE23 + N22 - D3*E33
+    NE32 = NE33 + D3*FDI23 + N32
+    # Joint 1
+    N31 = ZZ1R*QDP1
+    NE31 = N31 - S2*NE12 - C2*NE22
+    # Friction, actuators
+    QP56 = QP5 + QP6
+    FSM6signQP56 = FSM6*_sign(QP56)
+    # Results
+    return (
+        OFFSET1 + NE31 + FV1*QP1 + FS1*_sign(QP1),
+        OFFSET2 + NE32 + FV2*QP2 + FS2*_sign(QP2),
+        OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*_sign(QP3),
+        OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*_sign(QP4),
+        OFFSET5 + NE35 + Ia5*QDP5 + Ia6*QDP6 + FV5*QP5 + FS5*_sign(QP5) + FVM6*QP6 + FSM6signQP56,
+        OFFSET6 + N36 + Ia6*(QDP5 + QDP6) + FV6*QP6 + FS6*_sign(QP6) + FVM6*QP5 + FSM6signQP56,
+    )
+
+
+def _inertia_matrix_block(q, X, D3, RL4, g):
+    """A, row by row: column i is Gamma for a unit acceleration of joint i from rest."""
+    xp = array_namespace(q)
+    # Inputs
+    zero = xp.zeros_like(q[..., 0])
+    q2 = q[..., 1]
+    q3 = q[..., 2]
+    q4 = q[..., 3]
+    q5 = q[..., 4]
+    q6 = q[..., 5]
+    ZZ1R = X[0]
+    XX2R = X[4]
+    XY2 = X[5]
+    XZ2R = X[6]
+    YZ2 = X[7]
+    ZZ2R = X[8]
+    XX3R = X[14]
+    XY3 = X[15]
+    XZ3 = X[16]
+    YZ3 = X[17]
+    ZZ3R = X[18]
+    MX3 = X[19]
+    MY3R = X[20]
+    Ia3 = X[21]
+    XX4R = X[25]
+    XY4 = X[26]
+    XZ4 = X[27]
+    YZ4 = X[28]
+    ZZ4R = X[29]
+    MX4 = X[30]
+    MY4R = X[31]
+    Ia4 = X[32]
+    XX5R = X[36]
+    XY5 = X[37]
+    XZ5 = X[38]
+    YZ5 = X[39]
+    ZZ5R = X[40]
+    MX5 = X[41]
+    MY5R = X[42]
+    Ia5 = X[43]
+    XX6R = X[47]
+    XY6 = X[48]
+    XZ6 = X[49]
+    YZ6 = X[50]
+    ZZ6 = X[51]
+    MX6 = X[52]
+    MY6 = X[53]
+    Ia6 = X[54]
+    # Trigonometry
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
+    th23 = q2 + q3
+    C23 = xp.cos(th23)
+    S23 = xp.sin(th23)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
+    # Link 3
+    VSP331 = D3*C2
+    # Link 4
+    WP141 = -S23*C4
+    WP241 = S23*S4
+    VSP341 = VSP331 + RL4*S23
+    VP141 = S4*VSP341
+    VP241 = C4*VSP341
+    # Link 5
+    WP151 = C5*WP141 - C23*S5
+    WP251 = -C23*C5 - S5*WP141
+    VP151 = C5*VP141
+    VP251 = -S5*VP141
+    # Link 6
+    WP161 = C6*WP151 + S6*WP241
+    WP261 = C6*WP241 - S6*WP151
+    VP161 = C6*VP151 + S6*VP241
+    VP261 = C6*VP241 - S6*VP151
+    # Joint 6
+    F161 = MY6*WP251
+    F261 = -MX6*WP251
+    F361 = MY6*WP161 - MX6*WP261
+    N161 = XX6R*WP161 + XY6*WP261 - XZ6*WP251 - MY6*VP251
+    N261 = XY6*WP161 + MX6*VP251 - YZ6*WP251
+    N361 = YZ6*WP261 + XZ6*WP161 + MX6*VP261 - ZZ6*WP251 - MY6*VP161
+    FDI161 = C6*F161 - S6*F261
+    FDI361 = S6*F161 + C6*F261
+    # Joint 5
+    F151 = -MY5R*WP241
+    F251 = MX5*WP241
+    F351 = MY5R*WP151 - MX5*WP251
+    E151 = FDI161 + F151
+    E251 = F251 - F361
+    E351 = FDI361 + F351
+    N151 = XX5R*WP151 + XZ5*WP241 + XY5*WP251 + MY5R*VP241
+    N251 = XY5*WP151 + YZ5*WP241 - MX5*VP241
+    N351 = ZZ5R*WP241 + YZ5*WP251 + XZ5*WP151 + MX5*VP251 - MY5R*VP151
+    NE151 = C6*N161 + N151 - S6*N261
+    NE251 = N251 - N361
+    NE351 = S6*N161 + C6*N261 + N351
+    FDI151 = C5*E151 - S5*E251
+    FDI351 = -S5*E151 - C5*E251
+    # Joint 4
+    F141 = -MY4R*C23
+    F241 = MX4*C23
+    F341 = MY4R*WP141 - MX4*WP241
+    E141 = FDI151 + F141
+    E241 = E351 + F241
+    E341 = FDI351 + F341
+    N141 = XX4R*WP141 + XZ4*C23 + XY4*WP241
+    N241 = XY4*WP141 + YZ4*C23
+    N341 = ZZ4R*C23 + YZ4*WP241 + XZ4*WP141 + MX4*VP241 - MY4R*VP141
+    NE141 = C5*NE151 + N141 - S5*NE251
+    NE241 = NE351 + N241
+    NE341 = N341 - S5*NE151 - C5*NE251
+    FDI141 = C4*E141 - S4*E241
+    FDI341 = S4*E141 + C4*E241
+    # Joint 3
+    F331 = MX3*C23 - MY3R*S23
+    E331 = FDI341 + F331
+    N331 = -YZ3*C23 - XZ3*S23
+    N131 = MY3R*VSP331 - XX3R*S23 - XY3*C23
+    N231 = -XY3*S23 - MX3*VSP331
+    NE131 = C4*NE141 + N131 - S4*NE241 - RL4*FDI341
+    NE231 = N231 - NE341
+    NE331 = S4*NE141 + C4*NE241 + RL4*FDI141 + N331
+    FDI231 = S3*FDI141 - C3*E341
+    # Joint 2
+    N121 = -XX2R*S2 - XY2*C2
+    N221 = -XY2*S2
+    N321 = -YZ2*C2 - XZ2R*S2
+    NE121 = C3*NE131 + N121 - S3*NE231
+    NE221 = S3*NE131 + C3*NE231 + N221 - D3*E331
+    NE321 = NE331 + D3*FDI231 + N321
+    # Joint 1
+    NE311 = ZZ1R - S2*NE121 - C2*NE221
+    # Link 3
+    VP132 = D3*S3
+    VP232 = D3*C3
+    # Link 4
+    VSP142 = RL4 + VP132
+    VP142 = C4*VSP142
+    VP242 = -S4*VSP142
+    # Link 5
+    WP152 = S4*C5
+    WP252 = -S4*S5
+    VP152 = C5*VP142 + S5*VP232
+    VP252 = C5*VP232 - S5*VP142
+    # Link 6
+    WP162 = C6*WP152 + C4*S6
+    WP262 = C4*C6 - S6*WP152
+    VP162 = C6*VP152 + S6*VP242
+    VP262 = C6*VP242 - S6*VP152
+    # Joint 6
+    F162 = MY6*WP252
+    F262 = -MX6*WP252
+    F362 = MY6*WP162 - MX6*WP262
+    XX6RWP162pXZ6WP252pXY6WP262 = XX6R*WP162 + XY6*WP262 - XZ6*WP252
+    XY6WP162pYZ6WP252 = XY6*WP162 - YZ6*WP252
+    ZZ6WP252pYZ6WP262pXZ6WP162 = YZ6*WP262 + XZ6*WP162 - ZZ6*WP252
+    N162 = XX6RWP162pXZ6WP252pXY6WP262 - MY6*VP252
+    N262 = XY6WP162pYZ6WP252 + MX6*VP252
+    N362 = ZZ6WP252pYZ6WP262pXZ6WP162 + MX6*VP262 - MY6*VP162
+    FDI162 = C6*F162 - S6*F262
+    FDI362 = S6*F162 + C6*F262
+    # Joint 5
+    F152 = -MY5R*C4
+    F252 = MX5*C4
+    F352 = MY5R*WP152 - MX5*WP252
+    E152 = FDI162 + F152
+    E252 = F252 - F362
+    E352 = FDI362 + F352
+    XX5RWP152pXZ5C4mXY5WP252 = XX5R*WP152 + XZ5*C4 + XY5*WP252
+    XY5WP152pYZ5C4 = XY5*WP152 + YZ5*C4
+    ZZ5RC4mYZ5WP252pXZ5WP152 = ZZ5R*C4 + YZ5*WP252 + XZ5*WP152
+    N152 = XX5RWP152pXZ5C4mXY5WP252 + MY5R*VP242
+    N252 = XY5WP152pYZ5C4 - MX5*VP242
+    N352 = ZZ5RC4mYZ5WP252pXZ5WP152 + MX5*VP252 - MY5R*VP152
+    NE152 = C6*N162 + N152 - S6*N262
+    NE252 = N252 - N362
+    NE352 = S6*N162 + C6*N262 + N352
+    FDI152 = C5*E152 - S5*E252
+    FDI352 = -S5*E152 - C5*E252
+    # Joint 4
+    F342 = MY4R*S4 - MX4*C4
+    E342 = FDI352 + F342
+    N143 = XX4R*S4 + XY4*C4
+    N243 = XY4*S4
+    YZ4C4pXZ4S4 = YZ4*C4 + XZ4*S4
+    N142 = N143 - MY4R*VP232
+    N242 = N243 + MX4*VP232
+    N342 = YZ4C4pXZ4S4 + MX4*VP242 - MY4R*VP142
+    NE142 = C5*NE152 + N142 - S5*NE252
+    NE242 = NE352 + N242
+    NE342 = N342 - S5*NE152 - C5*NE252
+    FDI142 = C4*FDI152 - S4*E352
+    RL4FDI142 = RL4*FDI142
+    # Joint 3
+    E132 = FDI142 - MY3R
+    E232 = MX3 - E342
+    N332 = ZZ3R + MX3*VP232 - MY3R*VP132
+    NE332 = S4*NE142 + C4*NE242 + RL4FDI142 + N332
+    FDI232 = S3*E132 + C3*E232
+    # Joint 2
+    NE322 = ZZ2R + NE332 + D3*FDI232
+    # Link 4
+    VP143 = RL4*C4
+    VP243 = -RL4*S4
+    # Link 5
+    VP153 = C5*VP143
+    VP253 = -S5*VP143
+    # Link 6
+    VP163 = C6*VP153 + S6*VP243
+    VP263 = C6*VP243 - S6*VP153
+    # Joint 6
+    N163 = XX6RWP162pXZ6WP252pXY6WP262 - MY6*VP253
+    N263 = XY6WP162pYZ6WP252 + MX6*VP253
+    N363 = ZZ6WP252pYZ6WP262pXZ6WP162 + MX6*VP263 - MY6*VP163
+    # Joint 5
+    N153 = XX5RWP152pXZ5C4mXY5WP252 + MY5R*VP243
+    N253 = XY5WP152pYZ5C4 - MX5*VP243
+    N353 = ZZ5RC4mYZ5WP252pXZ5WP152 + MX5*VP253 - MY5R*VP153
+    NE153 = C6*N163 + N153 - S6*N263
+    NE253 = N253 - N363
+    NE353 = S6*N163 + C6*N263 + N353
+    # Joint 4
+    N343 = YZ4C4pXZ4S4 + MX4*VP243 - MY4R*VP143
+    NE143 = N143 + C5*NE153 - S5*NE253
+    NE243 = N243 + NE353
+    NE343 = N343 - S5*NE153 - C5*NE253
+    # Joint 3
+    NE333 = ZZ3R + RL4FDI142 + S4*NE143 + C4*NE243
+    # Link 6
+    WP164 = -S5*C6
+    WP264 = S5*S6
+    # Joint 6
+    N164 = XX6R*WP164 + XZ6*C5 + XY6*WP264
+    N264 = XY6*WP164 + YZ6*C5
+    N364 = ZZ6*C5 + YZ6*WP264 + XZ6*WP164
+    # Joint 5
+    N154 = -XX5R*S5 - XY5*C5
+    N254 = -XY5*S5
+    N354 = -YZ5*C5 - XZ5*S5
+    NE154 = C6*N164 + N154 - S6*N264
+    NE254 = N254 - N364
+    NE354 = S6*N164 + C6*N264 + N354
+    # Joint 4
+    NE344 = ZZ4R - S5*NE154 - C5*NE254
+    # Joint 6
+    N165 = XX6R*S6 + XY6*C6
+    N265 = XY6*S6
+    N365 = YZ6*C6 + XZ6*S6
+    # Joint 5
+    NE355 = ZZ5R + S6*N165 + C6*N265
+    # Results
+    return (
+        NE311,             # 0, 0
+        NE321,             # 0, 1
+        NE331,             # 0, 2
+        NE341,             # 0, 3
+        NE351,             # 0, 4
+        N361,              # 0, 5
+        NE321,             # 1, 0
+        NE322,             # 1, 1
+        NE332,             # 1, 2
+        NE342,             # 1, 3
+        NE352,             # 1, 4
+        N362,              # 1, 5
+        NE331,             # 2, 0
+        NE332,             # 2, 1
+        Ia3 + NE333,       # 2, 2
+        NE343,             # 2, 3
+        NE353,             # 2, 4
+        N363,              # 2, 5
+        NE341,             # 3, 0
+        NE342,             # 3, 1
+        NE343,             # 3, 2
+        Ia4 + NE344,       # 3, 3
+        NE354,             # 3, 4
+        N364,              # 3, 5
+        NE351,             # 4, 0
+        NE352,             # 4, 1
+        NE353,             # 4, 2
+        NE354,             # 4, 3
+        Ia5 + NE355,       # 4, 4
+        Ia6 + N365,        # 4, 5
+        N361,              # 5, 0
+        N362,              # 5, 1
+        N363,              # 5, 2
+        N364,              # 5, 3
+        Ia6 + N365,        # 5, 4
+        ZZ6 + Ia6 + zero,  # 5, 5
+    )
+
+
+def _bias_block(q, qd, X, D3, RL4, g):
+    """Gamma of each joint at qdd = 0."""
+    xp = array_namespace(q)
+    # Inputs
+    q2 = q[..., 1]
+    q3 = q[..., 2]
+    q4 = q[..., 3]
+    q5 = q[..., 4]
+    q6 = q[..., 5]
+    QP1 = qd[..., 0]
+    QP2 = qd[..., 1]
+    QP3 = qd[..., 2]
+    QP4 = qd[..., 3]
+    QP5 = qd[..., 4]
+    QP6 = qd[..., 5]
+    FV1 = X[1]
+    FS1 = X[2]
+    OFFSET1 = X[3]
+    XX2R = X[4]
+    XY2 = X[5]
+    XZ2R = X[6]
+    YZ2 = X[7]
+    ZZ2R = X[8]
+    MX2R = X[9]
+    MY2 = X[10]
+    FV2 = X[11]
+    FS2 = X[12]
+    OFFSET2 = X[13]
+    XX3R = X[14]
+    XY3 = X[15]
+    XZ3 = X[16]
+    YZ3 = X[17]
+    ZZ3R = X[18]
+    MX3 = X[19]
+    MY3R = X[20]
+    FV3 = X[22]
+    FS3 = X[23]
+    OFFSET3 = X[24]
+    XX4R = X[25]
+    XY4 = X[26]
+    XZ4 = X[27]
+    YZ4 = X[28]
+    ZZ4R = X[29]
+    MX4 = X[30]
+    MY4R = X[31]
+    FV4 = X[33]
+    FS4 = X[34]
+    OFFSET4 = X[35]
+    XX5R = X[36]
+    XY5 = X[37]
+    XZ5 = X[38]
+    YZ5 = X[39]
+    ZZ5R = X[40]
+    MX5 = X[41]
+    MY5R = X[42]
+    FV5 = X[44]
+    FS5 = X[45]
+    OFFSET5 = X[46]
+    XX6R = X[47]
+    XY6 = X[48]
+    XZ6 = X[49]
+    YZ6 = X[50]
+    ZZ6 = X[51]
+    MX6 = X[52]
+    MY6 = X[53]
+    FV6 = X[55]
+    FS6 = X[56]
+    OFFSET6 = X[57]
+    FVM6 = X[58]
+    FSM6 = X[59]
+    # Trigonometry
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
+    th23 = q2 + q3
+    C23 = xp.cos(th23)
+    S23 = xp.sin(th23)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
+    # Link 2
+    W12 = -S2*QP1
+    W22 = -C2*QP1
+    WP12 = QP2*W22
+    WP22 = -QP2*W12
+    DV112 = W12**2
+    DV122 = W12*W22
+    DV222 = W22**2
+    DV332 = QP2**2
+    DW232 = DV222 - DV332
+    DW312 = DV332 - DV112
+    DW122 = DV112 - DV222
+    U112 = -DV222 - DV332
+    U312 = -2*WP22
+    U322 = 2*WP12
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 3
+    W33 = QP2 + QP3
+    W13 = -S23*QP1
+    W23 = -C23*QP1
+    WP13 = W33*W23
+    WP23 = -W33*W13
+    DV113 = W13**2
+    DV123 = W13*W23
+    DV223 = W23**2
+    DV333 = W33**2
+    DW233 = DV223 - DV333
+    DW313 = DV333 - DV113
+    DW123 = DV113 - DV223
+    U113 = -DV223 - DV333
+    U223 = -DV113 - DV333
+    U313 = -2*WP23
+    U323 = 2*WP13
+    VSP33 = D3*U312
+    VSP13 = VP12 + D3*U112
+    VSP23 = VP22 + D3*DV122
+    VP13 = C3*VSP13 + S3*VSP23
+    VP23 = C3*VSP23 - S3*VSP13
+    # Link 4
+    W14 = C4*W13 + S4*W33
+    W24 = C4*W33 - S4*W13
+    W34 = QP4 - W23
+    WP14 = C4*WP13 + QP4*W24
+    WP24 = -S4*WP13 - QP4*W14
+    DV114 = W14**2
+    DV124 = W14*W24
+    DV134 = W14*W34
+    DV224 = W24**2
+    DV234 = W24*W34
+    DV334 = W34**2
+    DW234 = DV224 - DV334
+    DW314 = DV334 - DV114
+    DW124 = DV114 - DV224
+    U114 = -DV224 - DV334
+    U124 = WP23 + DV124
+    U134 = WP24 + DV134
+    U214 = DV124 - WP23
+    U224 = -DV114 - DV334
+    U234 = DV234 - WP14
+    U314 = DV134 - WP24
+    U324 = WP14 + DV234
+    VSP14 = VP13 - RL4*DV123
+    VSP24 = VP23 - RL4*U223
+    VSP34 = VSP33 - RL4*U323
+    VP14 = C4*VSP14 + S4*VSP34
+    VP24 = C4*VSP34 - S4*VSP14
+    # Link 5
+    W15 = C5*W14 - S5*W34
+    W25 = -C5*W34 - S5*W14
+    W35 = QP5 + W24
+    WP15 = C5*WP14 + S5*WP23 + QP5*W25
+    WP25 = C5*WP23 - S5*WP14 - QP5*W15
+    DV115 = W15**2
+    DV125 = W15*W25
+    DV135 = W15*W35
+    DV225 = W25**2
+    DV235 = W25*W35
+    DV335 = W35**2
+    DW235 = DV225 - DV335
+    DW315 = DV335 - DV115
+    DW125 = DV115 - DV225
+    U115 = -DV225 - DV335
+    U125 = DV125 - WP24
+    U135 = WP25 + DV135
+    U215 = WP24 + DV125
+    U225 = -DV115 - DV335
+    U235 = DV235 - WP15
+    U315 = DV135 - WP25
+    U325 = WP15 + DV235
+    VP15 = C5*VP14 + S5*VSP24
+    VP25 = C5*VSP24 - S5*VP14
+    # Link 6
+    W16 = C6*W15 + S6*W35
+    W26 = C6*W35 - S6*W15
+    W36 = QP6 - W25
+    WP16 = C6*WP15 + S6*WP24 + QP6*W26
+    WP26 = C6*WP24 - S6*WP15 - QP6*W16
+    DV116 = W16**2
+    DV126 = W16*W26
+    DV136 = W16*W36
+    DV226 = W26**2
+    DV236 = W26*W36
+    DV336 = W36**2
+    DW236 = DV226 - DV336
+    DW316 = DV336 - DV116
+    DW126 = DV116 - DV226
+    U116 = -DV226 - DV336
+    U126 = WP25 + DV126
+    U136 = WP26 + DV136
+    U216 = DV126 - WP25
+    U226 = -DV116 - DV336
+    U236 = DV236 - WP16
+    U316 = DV136 - WP26
+    U326 = WP16 + DV236
+    VP16 = C6*VP15 + S6*VP24
+    VP26 = C6*VP24 - S6*VP15
+    # Joint 6
+    F16 = MX6*U116 + MY6*U126
+    F26 = MX6*U216 + MY6*U226
+    F36 = MX6*U316 + MY6*U326
+    N16 = XX6R*WP16 + ZZ6*DV236 + YZ6*DW236 + XZ6*U216 - XY6*U316 - MY6*VP25
+    N26 = (XX6R - ZZ6)*DV136 + XZ6*DW316 + XY6*U326 + MX6*VP25 - YZ6*U126
+    N36 = XY6*DW126 + YZ6*U136 + MX6*VP26 - ZZ6*WP25 - XX6R*DV126 - XZ6*U236 - MY6*VP16
+    FDI16 = C6*F16 - S6*F26
+    FDI36 = S6*F16 + C6*F26
+    # Joint 5
+    F15 = MX5*U115 + MY5R*U125
+    F25 = MX5*U215 + MY5R*U225
+    F35 = MX5*U315 + MY5R*U325
+    E15 = FDI16 + F15
+    E25 = F25 - F36
+    E35 = FDI36 + F35
+    N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VP24 - XY5*U315
+    N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VP24
+    N35 = ZZ5R*WP24 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
+    NE15 = C6*N16 + N15 - S6*N26
+    NE25 = N25 - N36
+    NE35 = S6*N16 + C6*N26 + N35
+    FDI15 = C5*E15 - S5*E25
+    FDI35 = -S5*E15 - C5*E25
+    # Joint 4
+    F14 = MX4*U114 + MY4R*U124
+    F24 = MX4*U214 + MY4R*U224
+    F34 = MX4*U314 + MY4R*U324
+    E14 = FDI15 + F14
+    E24 = E35 + F24
+    E34 = FDI35 + F34
+    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4*U314 - MY4R*VSP24
+    N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4*U324 + MX4*VSP24 - YZ4*U124
+    N34 = XY4*DW124 + YZ4*U134 + MX4*VP24 - ZZ4R*WP23 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
+    NE14 = C5*NE15 + N14 - S5*NE25
+    NE24 = NE35 + N24
+    NE34 = N34 - S5*NE15 - C5*NE25
+    FDI14 = C4*E14 - S4*E24
+    FDI34 = S4*E14 + C4*E24
+    # Joint 3
+    F13 = MX3*U113 + MY3R*DV123
+    F23 = MX3*DV123 + MY3R*U223
+    F33 = MX3*U313 + MY3R*U323
+    E13 = FDI14 + F13
+    E23 = F23 - E34
+    E33 = FDI34 + F33
+    N13 = XX3R*WP13 + ZZ3R*WP13 + YZ3*DW233 + XZ3*DV123 + MY3R*VSP33 - XY3*U313
+    N23 = XZ3*DW313 + XY3*U323 - (XX3R - ZZ3R)*WP23 - YZ3*DV123 - MX3*VSP33
+    N33 = XY3*DW123 + MX3*VP23 - XX3R*DV123 - MY3R*VP13
+    NE13 = C4*NE14 + N13 - S4*NE24 - RL4*FDI34
+    NE23 = N23 - NE34
+    NE33 = S4*NE14 + C4*NE24 + RL4*FDI14 + N33
+    FDI23 = S3*E13 + C3*E23
+    # Joint 2
+    N12 = XX2R*WP12 + ZZ2R*WP12 + YZ2*DW232 + XZ2R*DV122 - XY2*U312
+    N22 = XZ2R*DW312 + XY2*U322 - (XX2R - ZZ2R)*WP22 - YZ2*DV122
+    N32 = XY2*DW122 + MX2R*VP22 - XX2R*DV122 - MY2*VP12
+    NE12 = C3*NE13 + N12 - S3*NE23
+    NE22 = S3*NE13 + C3*NE23 + N22 - D3*E33
+    NE32 = NE33 + D3*FDI23 + N32
+    NE31 = -S2*NE12 - C2*NE22
+    # Friction, actuators
+    QP56 = QP5 + QP6
+    FSM6signQP56 = FSM6*_sign(QP56)
+    # Results
+    return (
+        OFFSET1 + NE31 + FV1*QP1 + FS1*_sign(QP1),
+        OFFSET2 + NE32 + FV2*QP2 + FS2*_sign(QP2),
+        OFFSET3 + NE33 + FV3*QP3 + FS3*_sign(QP3),
+        OFFSET4 + NE34 + FV4*QP4 + FS4*_sign(QP4),
+        OFFSET5 + NE35 + FV5*QP5 + FS5*_sign(QP5) + FVM6*QP6 + FSM6signQP56,
+        OFFSET6 + N36 + FV6*QP6 + FS6*_sign(QP6) + FVM6*QP5 + FSM6signQP56,
+    )
+
+
+def _gravity_block(q, X, D3, RL4, g):
+    """Gamma of each joint at rest without friction."""
+    xp = array_namespace(q)
+    # Inputs
+    q2 = q[..., 1]
+    q3 = q[..., 2]
+    q4 = q[..., 3]
+    q5 = q[..., 4]
+    q6 = q[..., 5]
+    OFFSET1 = X[3]
+    MX2R = X[9]
+    MY2 = X[10]
+    OFFSET2 = X[13]
+    MX3 = X[19]
+    MY3R = X[20]
+    OFFSET3 = X[24]
+    MX4 = X[30]
+    MY4R = X[31]
+    OFFSET4 = X[35]
+    MX5 = X[41]
+    MY5R = X[42]
+    OFFSET5 = X[46]
+    MX6 = X[52]
+    MY6 = X[53]
+    OFFSET6 = X[57]
+    # Trigonometry
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
+    # Link 2
+    VP12 = -g*S2
+    VP22 = -g*C2
+    # Link 3
+    VP13 = C3*VP12 + S3*VP22
+    VP23 = C3*VP22 - S3*VP12
+    # Link 4
+    VP14 = C4*VP13
+    VP24 = -S4*VP13
+    # Link 5
+    VP15 = C5*VP14 + S5*VP23
+    VP25 = C5*VP23 - S5*VP14
+    # Link 6
+    VP16 = C6*VP15 + S6*VP24
+    VP26 = C6*VP24 - S6*VP15
+    # Joint 6
+    N16 = -MY6*VP25
+    N26 = MX6*VP25
+    N36 = MX6*VP26 - MY6*VP16
+    # Joint 5
+    N15 = MY5R*VP24
+    N25 = -MX5*VP24
+    N35 = MX5*VP25 - MY5R*VP15
+    NE15 = C6*N16 + N15 - S6*N26
+    NE25 = N25 - N36
+    NE35 = S6*N16 + C6*N26 + N35
+    # Joint 4
+    N14 = -MY4R*VP23
+    N24 = MX4*VP23
+    N34 = MX4*VP24 - MY4R*VP14
+    NE14 = C5*NE15 + N14 - S5*NE25
+    NE24 = NE35 + N24
+    NE34 = N34 - S5*NE15 - C5*NE25
+    NE13 = C4*NE14 - S4*NE24
+    # Joint 3
+    N33 = MX3*VP23 - MY3R*VP13
+    NE33 = S4*NE14 + C4*NE24 + N33
+    NE12 = C3*NE13 + S3*NE34
+    NE22 = S3*NE13 - C3*NE34
+    # Joint 2
+    N32 = MX2R*VP22 - MY2*VP12
+    NE32 = NE33 + N32
+    NE31 = -S2*NE12 - C2*NE22
+    # Results
+    return (
+        OFFSET1 + NE31,
+        OFFSET2 + NE32,
+        OFFSET3 + NE33,
+        OFFSET4 + NE34,
+        OFFSET5 + NE35,
+        OFFSET6 + N36,
+    )
+
+
+def _frame_poses_block(q, D3, RL4, g):
+    """The transforms of all frames, row by row."""
+    xp = array_namespace(q)
+    # Inputs
+    zero = xp.zeros_like(q[..., 0])
+    q1 = q[..., 0]
+    q2 = q[..., 1]
+    q3 = q[..., 2]
+    q4 = q[..., 3]
+    q5 = q[..., 4]
+    q6 = q[..., 5]
+    # Trigonometry
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    th23 = q2 + q3
+    C23 = xp.cos(th23)
+    S23 = xp.sin(th23)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
+    # Frame 2
+    R112 = C1*C2
+    R122 = -C1*S2
+    R212 = S1*C2
+    R222 = -S1*S2
+    # Frame 3
+    R113 = C1*C23
+    R123 = -C1*S23
+    R213 = S1*C23
+    R223 = -S1*S23
+    P13 = D3*R112
+    P23 = D3*R212
+    P33 = -D3*S2
+    # Frame 4
+    R114 = C4*R113 - S1*S4
+    R124 = -S1*C4 - S4*R113
+    R214 = C4*R213 + C1*S4
+    R224 = C1*C4 - S4*R213
+    R314 = -S23*C4
+    R324 = S23*S4
+    P14 = P13 - RL4*R123
+    P24 = P23 - RL4*R223
+    P34 = P33 + RL4*C23
+    # Frame 5
+    R115 = C5*R114 + S5*R123
+    R125 = C5*R123 - S5*R114
+    R215 = C5*R214 + S5*R223
+    R225 = C5*R223 - S5*R214
+    R315 = C5*R314 - C23*S5
+    R325 = -C23*C5 - S5*R314
+    # Frame 6
+    R116 = C6*R115 + S6*R124
+    R126 = C6*R124 - S6*R115
+    R216 = C6*R215 + S6*R224
+    R226 = C6*R224 - S6*R215
+    R316 = C6*R315 + S6*R324
+    R326 = C6*R324 - S6*R315
+    # Results
+    return (
+        C1,          # frame 1, row 1
+        -S1,
+        zero,
+        zero,
+        S1,          # frame 1, row 2
+        C1,
+        zero,
+        zero,
+        zero,        # frame 1, row 3
+        zero,
+        1.0 + zero,
+        zero,
+        zero,
+        zero,
+        zero,
+        1.0 + zero,
+        R112,        # frame 2, row 1
+        R122,
+        -S1,
+        zero,
+        R212,        # frame 2, row 2
+        R222,
+        C1,
+        zero,
+        -S2,         # frame 2, row 3
+        -C2,
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+        1.0 + zero,
+        R113,        # frame 3, row 1
+        R123,
+        -S1,
+        P13,
+        R213,        # frame 3, row 2
+        R223,
+        C1,
+        P23,
+        -S23,        # frame 3, row 3
+        -C23,
+        zero,
+        P33,
+        zero,
+        zero,
+        zero,
+        1.0 + zero,
+        R114,        # frame 4, row 1
+        R124,
+        -R123,
+        P14,
+        R214,        # frame 4, row 2
+        R224,
+        -R223,
+        P24,
+        R314,        # frame 4, row 3
+        R324,
+        C23,
+        P34,
+        zero,
+        zero,
+        zero,
+        1.0 + zero,
+        R115,        # frame 5, row 1
+        R125,
+        R124,
+        P14,
+        R215,        # frame 5, row 2
+        R225,
+        R224,
+        P24,
+        R315,        # frame 5, row 3
+        R325,
+        R324,
+        P34,
+        zero,
+        zero,
+        zero,
+        1.0 + zero,
+        R116,        # frame 6, row 1
+        R126,
+        -R125,
+        P14,
+        R216,        # frame 6, row 2
+        R226,
+        -R225,
+        P24,
+        R316,        # frame 6, row 3
+        R326,
+        -R325,
+        P34,
+        zero,
+        zero,
+        zero,
+        1.0 + zero,
+    )

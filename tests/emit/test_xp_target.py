@@ -1,0 +1,189 @@
+"""The array-API module: agreement with the NumPy module under several array packages, transformations of JAX and PyTorch, the table of signals."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symgen.cli.generate import emitted
+from symgen.description import load_robot, packaged_robots
+from symgen.emit import generate_files
+from symgen.errors import SymgenError
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+GENERAL_LOOPS = {"four_bar", "five_bar"}  # closed by Newton iteration: NumPy only
+ROBOTS = [name for name in packaged_robots() if name not in GENERAL_LOOPS]
+TOLERANCE = 1e-12  # of each column's maximum
+N = 37
+
+
+def module(name: str, text: str) -> ModuleType:
+    found = ModuleType(name)
+    exec(compile(text, name, "exec"), found.__dict__)  # noqa: S102 (our own output)
+    return found
+
+
+@cache
+def models(name: str) -> tuple[Any, Any]:
+    """(NumPy, array API)."""
+    pytest.importorskip("array_api_compat")
+    files = generate_files(load_robot(name), targets=("numpy", "xp"), command=name)
+    return module(name, files[f"{name}.py"]), module(f"{name}_xp", files[f"{name}_xp.py"])
+
+
+def package(name: str) -> Any:
+    found = pytest.importorskip(name)
+    if name == "jax":
+        found.config.update("jax_enable_x64", True)
+        return importlib.import_module("jax.numpy")
+    return found
+
+
+def host(x: Any) -> np.ndarray:
+    return np.asarray(getattr(x, "_array", x))  # array_api_strict keeps its NumPy array there
+
+
+def deviation(found: Any, expected: Any) -> float:
+    """Largest difference in units of each column's maximum."""
+    found, expected = host(found), np.asarray(expected)
+    assert found.shape == expected.shape and found.dtype == np.float64
+    scale = np.abs(expected).max(axis=tuple(range(expected.ndim - 1)))
+    return float((np.abs(found - expected) / np.where(scale > 0, scale, 1)).max())
+
+
+def calls(model: Any) -> dict[str, tuple[np.ndarray, ...]]:
+    rng = np.random.default_rng(3)
+    q, qd, qdd, tau = rng.uniform(-2, 2, (4, N, len(model.JOINTS)))
+    X, standard = rng.uniform(0.5, 1, len(model.BASE_PARAMETERS)), rng.uniform(-1, 1, len(model.STANDARD_PARAMETERS))
+    found: dict[str, tuple[np.ndarray, ...]] = {
+        "regressor": (q, qd, qdd),
+        "observation_matrix": (q, qd, qdd),
+        "inverse_dynamics": (q, qd, qdd, X),
+        "inertia_matrix": (q, X),
+        "bias": (q, qd, X),
+        "gravity": (q, X),
+        "forward_dynamics": (q, qd, tau, X),
+        "frame_poses": (q,),
+        "jacobian": (q,),
+        "base_parameters": (standard,),
+    }
+    return found | ({"passive_joints": (q,)} if hasattr(model, "passive_joints") else {})
+
+
+def agree(name: str, xp: Any) -> None:
+    reference, model = models(name)
+    for function, arguments in calls(reference).items():
+        found = getattr(model, function)(*(xp.asarray(x) for x in arguments))
+        assert deviation(found, getattr(reference, function)(*arguments)) <= TOLERANCE, function
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_agrees_under_numpy_and_under_the_strict_standard(name):
+    agree(name, np)
+    agree(name, package("array_api_strict"))
+
+
+@pytest.mark.parametrize("name", ["tx40", "haptic", "sr400", "emps_asymmetric"])
+def test_agrees_under_jax(name):
+    agree(name, package("jax"))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_agrees_under_torch(name):
+    agree(name, package("torch"))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_entries_place_the_signals(name):
+    reference, model = models(name)
+    q, qd, qdd = calls(reference)["regressor"]
+    signals = model.signals(q, qd, qdd)
+    assert signals.shape == (model.SIGNALS, N)
+    store = reference.store(N).view(np.ndarray) * 0.0
+    for k, j, s, c in model.ENTRIES:
+        store[k, j] = c * signals[s]
+    assert deviation(store.transpose(2, 1, 0), reference.regressor(q, qd, qdd)) <= TOLERANCE
+    np.testing.assert_array_equal(np.array(model.STRUCTURE), reference.STRUCTURE)
+    places = {(k, j) for k, j, *_ in model.ENTRIES}
+    assert places == set(zip(*np.nonzero(reference.STRUCTURE), strict=True)) and len(places) == len(model.ENTRIES)
+    largest = np.abs(signals).argmax(axis=1)
+    upright = signals * np.sign(signals[np.arange(model.SIGNALS), largest])[:, None]
+    assert len(np.unique(upright.round(9) + 0.0, axis=0)) == model.SIGNALS  # no two are equal up to sign
+
+
+def test_any_leading_axes_and_passive_rates():
+    _, model = models("sr400")
+    q, qd, qdd = np.random.default_rng(1).uniform(-1, 1, (3, 4, 5, len(model.JOINTS)))
+    grid = model.regressor(q, qd, qdd)
+    np.testing.assert_array_equal(grid[2, 3], model.regressor(q[2, 3], qd[2, 3], qdd[2, 3]))
+    ahead = model.passive_joints(q + 1e-6 * qd)
+    position, velocity, acceleration = model.passive_joints(q, qd, qdd)
+    np.testing.assert_allclose((ahead - position) / 1e-6, velocity, atol=1e-8)
+    assert acceleration.shape == velocity.shape == (4, 5, len(model.PASSIVE))
+
+
+def test_constants_are_keywords():
+    reference, model = models("tx40")
+    q, qd, qdd = calls(reference)["regressor"]
+    changed = {"D3": 0.3, "g": 1.6}
+    assert deviation(model.regressor(q, qd, qdd, **changed), reference.regressor(q, qd, qdd, **changed)) <= TOLERANCE
+
+
+def test_jax_compiles_maps_and_differentiates():
+    jnp = package("jax")
+    import jax
+
+    reference, model = models("planar_2r")
+    q, qd, qdd, X = map(jnp.asarray, calls(reference)["inverse_dynamics"])
+    expected = reference.inverse_dynamics(*calls(reference)["inverse_dynamics"])
+    assert deviation(jax.jit(model.inverse_dynamics)(q, qd, qdd, X), expected) <= TOLERANCE
+    assert deviation(jax.vmap(model.inverse_dynamics, in_axes=(0, 0, 0, None))(q, qd, qdd, X), expected) <= TOLERANCE
+    by_X = jax.jacfwd(model.inverse_dynamics, argnums=3)(q, qd, qdd, X)  # the torques are linear in X: this is the regressor
+    assert deviation(by_X, reference.regressor(*calls(reference)["regressor"])) <= TOLERANCE
+    by_length = jax.grad(lambda D2: model.inverse_dynamics(q, qd, qdd, X, D2=D2)[0, 0])(0.5)
+    step = [reference.inverse_dynamics(*calls(reference)["inverse_dynamics"], D2=0.5 + h)[0, 0] for h in (1e-5, -1e-5)]
+    assert float(by_length) == pytest.approx((step[0] - step[1]) / 2e-5, rel=1e-8)
+
+
+def test_torch_maps_and_differentiates():
+    torch = package("torch")
+    reference, model = models("planar_2r")
+    q, qd, qdd, X = map(torch.asarray, calls(reference)["inverse_dynamics"])
+    mapped = torch.func.vmap(model.inverse_dynamics, in_dims=(0, 0, 0, None))(q, qd, qdd, X)
+    assert deviation(mapped, reference.inverse_dynamics(*calls(reference)["inverse_dynamics"])) <= TOLERANCE
+    one_sided = models("emps_asymmetric")
+    states = calls(one_sided[0])["regressor"]
+    assert deviation(torch.func.vmap(one_sided[1].regressor)(*map(torch.asarray, states)), one_sided[0].regressor(*states)) <= TOLERANCE
+    by_acceleration = torch.func.vmap(torch.func.jacrev(model.inverse_dynamics, argnums=2), in_dims=(0, 0, 0, None))(q, qd, qdd, X)
+    assert deviation(by_acceleration, reference.inertia_matrix(host(q), host(X))) <= TOLERANCE
+
+
+def test_other_precisions_and_packages_are_refused():
+    _, model = models("planar_2r")
+    q = np.zeros((3, 2))
+    with pytest.raises(TypeError, match="float32; expected float64"):
+        model.regressor(q, q.astype(np.float32), q)
+    with pytest.raises(TypeError):
+        model.regressor(q, package("array_api_strict").asarray(q), q)
+
+
+def test_checked_in_text_is_current():
+    assert emitted(["tx40"], ("xp",)) == {"tx40_xp.py": (GENERATED / "tx40_xp.py").read_text(encoding="utf-8")}
+
+
+def test_loops_closed_by_iteration_have_none(capsys):
+    assert emitted(["four_bar"], ("numpy", "xp")).keys() == {"four_bar.py"}
+    assert "no xp target" in capsys.readouterr().err
+
+
+def test_a_constant_may_not_take_a_name_of_the_module():
+    robot = load_robot("planar_2r")
+    with pytest.raises(SymgenError, match="constant zero"):
+        generate_files(replace(robot, constants={**robot.constants, "zero": 1.0}), targets=("xp",))
