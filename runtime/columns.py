@@ -1,7 +1,7 @@
 """The columns of W, decimated: only the entries of the regressor that are not identically zero, and equal ones once.
 
 Most entries of W are structurally zero or repeat each other up to the sign (TX40: 135 signals of 360 entries), and decimation is linear: filter
-the signals, then place them. The regressor is evaluated in blocks on one reused store, so that memory is that of the signals.
+the signals, then place them. The regressor is evaluated in blocks on one reused store and decimated block by block: the signals are not stored.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from runtime.decimation import Decimation, Plan
 from runtime.model import GeneratedModel
-from runtime.signals import States, decimated
+from runtime.signals import States, decimation_plan
 from runtime.study import Decimate
 
 Array = np.ndarray
 
-BLOCK = 4096  # samples: rows of 32 kB, which stay in cache
+BLOCK = 8192  # samples evaluated at a time: few calls, rows of 64 kB that stay in cache
 PROBES = 64  # random states that tell signals apart
 
 
@@ -50,26 +51,58 @@ def decimated_columns(
     """
     wanted = np.arange(len(model.BASE_PARAMETERS)) if columns is None else np.asarray(columns, dtype=int)
     entries = distinct_entries(model, constants, wanted)
-    signals = decimated(signals_of(model, states, entries, constants), factor, settings)
+    signals = DecimatedSignals(model, entries, constants, decimation_plan(len(states), factor, settings))(states)
     store = np.zeros((len(wanted), len(model.JOINTS), signals.shape[-1]))
     store[entries.row, entries.j] = entries.sign[:, None] * signals[entries.which]
     return store
 
 
+class DistinctSignals:
+    """The distinct signals of a regressor, in room that the next call uses again."""
+
+    def __init__(self, model: GeneratedModel, entries: Entries, constants: Mapping[str, float]) -> None:
+        self.model, self.constants = model, constants
+        self.rows = (entries.k * len(model.JOINTS) + entries.j)[entries.source]
+        self._room: dict[int, tuple[Array, Array]] = {}  # by number of samples: store, signals
+
+    def __call__(self, states: States) -> Array:
+        """Signals of the states (B, n), shape (S, B)."""
+        B = len(states)
+        if B not in self._room:
+            self._room[B] = self.model.store(B), np.empty((len(self.rows), B))
+        out, signals = self._room[B]
+        D = self.model.regressor(states.q, states.qd, states.qdd, out=out, **self.constants)
+        return np.take(D.transpose(2, 1, 0).reshape(-1, B), self.rows, axis=0, out=signals, mode="clip")
+
+
+class DecimatedSignals:
+    """The distinct signals, decimated; room is kept from one call to the next. plan : None keeps every sample."""
+
+    def __init__(self, model: GeneratedModel, entries: Entries, constants: Mapping[str, float], plan: Plan | None) -> None:
+        self.signals = DistinctSignals(model, entries, constants)
+        self.decimation = None if plan is None else Decimation(plan, len(entries.source))
+
+    def __call__(self, states: States) -> Array:
+        """Signals of the states (N, n) of the window, shape (S, K)."""
+        if self.decimation is None:
+            return signals_in_blocks(self.signals, states)
+        for t0, t1 in self.decimation.plan.pieces(BLOCK):
+            self.decimation.take(self.signals(states[t0:t1]), t0)
+        return self.decimation.result()
+
+
 def signals_of(model: GeneratedModel, states: States, entries: Entries, constants: Mapping[str, float]) -> Array:
     """The distinct signals of the regressor, shape (S, N)."""
-    k, j = entries.k[entries.source], entries.j[entries.source]
+    return signals_in_blocks(DistinctSignals(model, entries, constants), states)
+
+
+def signals_in_blocks(signals: DistinctSignals, states: States) -> Array:
+    """The signals of all states, shape (S, N), evaluated block by block."""
     N = len(states)
-    signals = np.empty((len(k), N))
-    size = N if N <= 2 * BLOCK else BLOCK
-    out = model.store(size)
-    for t0 in range(0, N, size):
-        block = states[t0 : t0 + size]
-        if len(block) < size:
-            out = model.store(len(block))
-        D = model.regressor(block.q, block.qd, block.qdd, out=out, **constants)
-        signals[:, t0 : t0 + size] = D.transpose(2, 1, 0)[k, j]
-    return signals
+    result = np.empty((len(signals.rows), N))
+    for t0 in range(0, N, BLOCK):
+        result[:, t0 : t0 + BLOCK] = signals(states[t0 : t0 + BLOCK])
+    return result
 
 
 def distinct_entries(model: GeneratedModel, constants: Mapping[str, float], columns: Array | None = None) -> Entries:

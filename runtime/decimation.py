@@ -164,13 +164,10 @@ class Decimation:
         return y
 
 
-def decimate(u: Array, factor: int, phase: int, pad: int) -> Array:
-    """Filtered samples phase, phase + factor, ... of each row of u.
-
-    u : ndarray, shape (S, N), N > pad.   phase : first kept sample, 0 to factor - 1.   Returns shape (S, K).
-    """
-    decimation = Decimation(plan(u.shape[1], factor, phase, pad), len(u))
-    for t0, t1 in decimation.plan.pieces():
+def decimate(u: Array, plan: Plan) -> Array:
+    """Kept samples, shape (S, K), of signals u, shape (S, N)."""
+    decimation = Decimation(plan, len(u))
+    for t0, t1 in plan.pieces():
         decimation.take(u[:, t0:t1], t0)
     return decimation.result()
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.signal import butter, sosfiltfilt
 
-from runtime.decimation import CUTOFF, ORDER, decimate
+from runtime.decimation import CUTOFF, ORDER, Plan, decimate, plan
 from runtime.errors import InputError
 from runtime.study import Decimate, Lowpass, Signals
 
@@ -98,13 +98,17 @@ def decimated(x: Array, factor: int, settings: Decimate | None) -> Array:
 
     Of even order, the filter has gain 10**(-2*0.05/20) = 0.98855 at zero frequency: Y and every column of W need it alike, offsets too.
     """
+    how = decimation_plan(x.shape[-1], factor, settings)
+    return x if how is None else decimate(x.reshape(-1, x.shape[-1]), how).reshape(*x.shape[:-1], -1)
+
+
+def decimation_plan(N: int, factor: int, settings: Decimate | None) -> Plan | None:
+    """The decimation of N samples; None for a factor of 1."""
     if factor == 1 or settings is None:
-        return x
+        return None
     pad = 3 * ORDER if settings.padding == "matlab" else 3 * (ORDER + 1)
-    _long_enough(x.shape[-1], pad)
-    first = int(kept_samples(x.shape[-1], factor, settings.phase)[0])
-    rows = np.ascontiguousarray(x).reshape(-1, x.shape[-1])
-    return decimate(rows, factor, first, pad).reshape(*x.shape[:-1], -1)
+    _long_enough(N, pad)
+    return plan(N, factor, int(kept_samples(N, factor, settings.phase)[0]), pad)
 
 
 def zero_phase(sos: Array, x: Array, pad: int, axis: int) -> Array:
@@ -127,6 +131,7 @@ __all__ = [
     "States",
     "decimated",
     "decimation_factor",
+    "decimation_plan",
     "derivative",
     "filtered_states",
     "kept_samples",
