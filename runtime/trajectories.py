@@ -18,7 +18,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from runtime.errors import InputError
+from runtime.errors import InputError, SettingsError
+from runtime.mapping import structure
 
 Array = np.ndarray
 States = tuple[Any, Any, Any]  # q, qd, qdd
@@ -37,6 +38,9 @@ class Family(Protocol):
 
     def joint(self, t: Array, p: Any, math: Any) -> States:
         """q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p, shape (P,)."""
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Smallest and largest p, shape (P,) each; infinite where only the motion is limited."""
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
         """Random coefficients, shape (P,), of a motion about the middle of [lower, upper], no faster than about `speed`."""
@@ -68,6 +72,9 @@ class Fourier:
         one, zero = np.ones((len(t), 1)), np.zeros((len(t), 1))
         q, qd, qdd = np.hstack([one, s / wl, -c / wl]), np.hstack([zero, c, s]), np.hstack([zero, -s * wl, c * wl])
         return _linear((q, qd, qdd), p, math)
+
+    def bounds(self) -> tuple[Array, Array]:
+        return _free(len(self.names))
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
         orders = np.arange(1, self.harmonics + 1)
@@ -114,6 +121,12 @@ class Sinusoids:
             s, sd, sdd = s + A * math.sin(angle), sd + A * w * math.cos(angle), sdd - A * w**2 * math.sin(angle)
         return p[0] + e * s, ed * s + e * sd, edd * s + 2 * ed * sd + e * sdd
 
+    def bounds(self) -> tuple[Array, Array]:
+        lower, upper = _free(len(self.names))
+        f = slice(1 + self.terms, 1 + 2 * self.terms)
+        lower[f], upper[f] = 1 / self.length, self.highest
+        return lower, upper
+
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
         f = rng.uniform(0.1, 1.0, self.terms) * self.highest
         A = 0.5 * np.minimum((upper - lower) / 2, speed / (2 * np.pi * f)) / self.terms
@@ -131,7 +144,9 @@ class PointToPoint:
     def __post_init__(self) -> None:
         _positive("point-to-point", points=self.points - 1, travel=self.travel, blend=self.blend)
         if 2 * self.blend > self.travel:
-            raise InputError(f"point-to-point: gaining and losing speed takes {2 * self.blend} s of {self.travel} s; shorten `blend`")
+            raise SettingsError(
+                f"point-to-point: gaining and losing speed takes {2 * self.blend} s of {self.travel} s; shorten it", path=("blend",)
+            )
 
     @property
     def duration(self) -> float:
@@ -155,6 +170,9 @@ class PointToPoint:
             found[:, :, k + 1] += bump
         return tuple(found)
 
+    def bounds(self) -> tuple[Array, Array]:
+        return _free(len(self.names))
+
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
         return _walk(rng, self.points, lower, upper, 0.5 * speed * (self.travel - self.blend))
 
@@ -171,7 +189,9 @@ class Triangular:
     def __post_init__(self) -> None:
         _positive("triangular", points=self.points - 1, travel=self.travel, blend=self.blend, speed=self.speed)
         if self.blend > self.travel:
-            raise InputError(f"triangular: a corner takes {self.blend} s, more than the {self.travel} s between corners; shorten `blend`")
+            raise SettingsError(
+                f"triangular: a corner takes {self.blend} s, more than the {self.travel} s between corners; shorten it", path=("blend",)
+            )
 
     @property
     def duration(self) -> float:
@@ -193,6 +213,9 @@ class Triangular:
             found[:, :, k] -= piece
             found[:, :, k + 1] += piece
         return tuple(found)
+
+    def bounds(self) -> tuple[Array, Array]:
+        return _free(len(self.names))
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
         return _walk(rng, self.points, lower, upper, 0.8 * min(speed, self.speed) * self.travel)
@@ -278,16 +301,17 @@ def family_from_mapping(mapping: Mapping[str, Any]) -> Family:
     kind = FAMILIES.get(str(settings.pop("family", None)))
     if kind is None:
         raise InputError(f"no family {mapping.get('family')!r} of trajectories; there are {', '.join(FAMILIES)}")
-    unknown = settings.keys() - kind.__dataclass_fields__.keys()  # type: ignore[attr-defined]
-    if unknown:
-        raise InputError(f"{mapping['family']} has no {', '.join(sorted(unknown))}; it has {', '.join(kind.__dataclass_fields__)}")  # type: ignore[attr-defined]
-    family: Family = kind(**settings)
+    family: Family = structure(kind, settings)
     return family
 
 
 def label(family: Family) -> str:
     """The name of a family in files."""
     return next(name for name, kind in FAMILIES.items() if isinstance(family, kind))
+
+
+def _free(size: int) -> tuple[Array, Array]:
+    return np.full(size, -np.inf), np.full(size, np.inf)
 
 
 def _linear(basis: Sequence[Array], p: Any, math: Any) -> States:
@@ -324,4 +348,4 @@ def _between(rng: np.random.Generator, lower: float, upper: float) -> float:
 def _positive(family: str, **values: float) -> None:
     for name, value in values.items():
         if not (np.isfinite(value) and value > 0):
-            raise InputError(f"{family}: {name} is {value}; expected more than 0")
+            raise SettingsError(f"{family}: {value}; expected more than 0", path=(name,))
