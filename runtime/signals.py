@@ -62,13 +62,18 @@ def median_filtered(x: Array, window: int) -> Array:
 
 def lowpass_filtered(x: Array, rate: float, low: Lowpass) -> Array:
     """Zero-phase Butterworth along the first axis of x, shape (N, n); each pass is 3 dB down at the cut-off."""
+    return zero_phase(*butterworth(rate, low), x, axis=0)
+
+
+def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
+    """Second-order sections of the low-pass, shape (sections, 6), and the samples by which its ends are extended."""
     if low.cutoff >= rate / 2:
         raise InputError(
             f"low-pass at {low.cutoff:g} Hz for a record at {rate:g} Hz; expected less than the Nyquist frequency {rate / 2:g} Hz, set signals.lowpass.cutoff"
         )
     sos = butter(low.order, low.cutoff, fs=rate, output="sos")
     length = low.order + 1
-    return zero_phase(sos, x, 3 * (length - 1) if low.padding == "matlab" else 3 * length, axis=0)
+    return sos, 3 * (length - 1) if low.padding == "matlab" else 3 * length
 
 
 def derivative(x: Array, rate: float, ends: str = "one-sided") -> Array:
@@ -107,17 +112,18 @@ def decimation_plan(N: int, factor: int, settings: Decimate | None) -> Plan | No
     if factor == 1 or settings is None:
         return None
     pad = 3 * ORDER if settings.padding == "matlab" else 3 * (ORDER + 1)
-    _long_enough(N, pad)
+    require_longer(N, pad)
     return plan(N, factor, int(kept_samples(N, factor, settings.phase)[0]), pad)
 
 
-def zero_phase(sos: Array, x: Array, pad: int, axis: int) -> Array:
+def zero_phase(sos: Array, pad: int, x: Array, axis: int) -> Array:
     """Filter forward and backward after odd reflection of `pad` samples at each end, started in the steady state of the first value."""
-    _long_enough(x.shape[axis], pad)
+    require_longer(x.shape[axis], pad)
     return np.asarray(sosfiltfilt(sos, x, axis=axis, padtype="odd", padlen=pad))
 
 
-def _long_enough(samples: int, pad: int) -> None:
+def require_longer(samples: int, pad: int) -> None:
+    """Raise InputError unless there are more than `pad` samples to reflect."""
     if samples <= pad:
         raise InputError(
             f"{samples} samples; this zero-phase filter needs more than {pad}, use a longer record or window, or a lower order"
@@ -129,6 +135,7 @@ __all__ = [
     "Lowpass",
     "Signals",
     "States",
+    "butterworth",
     "decimated",
     "decimation_factor",
     "decimation_plan",
@@ -137,5 +144,6 @@ __all__ = [
     "kept_samples",
     "lowpass_filtered",
     "median_filtered",
+    "require_longer",
     "zero_phase",
 ]
