@@ -44,13 +44,15 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symgen" / "compiled"
 
 
-def shared_object(path: Path, text: bytes, folder: Path, opened: Callable[[Path], ctypes.CDLL]) -> ctypes.CDLL:
+def shared_object(
+    path: Path, text: bytes, folder: Path, opened: Callable[[Path], ctypes.CDLL], flags: Sequence[str] = FLAGS
+) -> ctypes.CDLL:
     """The shared object of a C file, from the cache or compiled; one that does not open is compiled again, once.
 
     text : what the file holds.   opened : loads and checks an object; raises NotCompiledError or OSError where it is not the one wanted.
     """
     command, version = compiler()
-    parts = (text, " ".join((*FLAGS, *LIBRARIES)).encode(), " ".join(command).encode(), version.encode(), _processor().encode())
+    parts = (text, " ".join((*flags, *LIBRARIES)).encode(), " ".join(command).encode(), version.encode(), _processor().encode())
     key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     if os.name == "posix" and folder.stat().st_mode & 0o002:
@@ -62,14 +64,14 @@ def shared_object(path: Path, text: bytes, folder: Path, opened: Callable[[Path]
             except (NotCompiledError, OSError):
                 pass
         found.unlink(missing_ok=True)
-    return opened(_compiled(command, path, text, folder, key[:32]))
+    return opened(_compiled(command, flags, path, text, folder, key[:32]))
 
 
-def _compiled(command: Sequence[str], path: Path, text: bytes, folder: Path, key: str) -> Path:
+def _compiled(command: Sequence[str], flags: Sequence[str], path: Path, text: bytes, folder: Path, key: str) -> Path:
     with TemporaryDirectory(dir=folder, prefix=".compiling-") as scratch:
         source, target = Path(scratch) / path.name, Path(scratch) / f"{path.stem}.so"
         source.write_bytes(text)
-        line = [*command, *FLAGS, source.name, "-o", target.name, *LIBRARIES]
+        line = [*command, *flags, source.name, "-o", target.name, *LIBRARIES]
         try:
             done = subprocess.run(line, cwd=scratch, capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
         except (OSError, subprocess.TimeoutExpired) as e:
