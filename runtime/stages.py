@@ -75,7 +75,9 @@ class ZeroPhase:
         self.last = np.empty((0, 0))  # the last pad + 1 samples
 
     def push(self, x: Array) -> Array:
-        """Results up to `ahead` samples before the last one, when there are at least as many; x, shape (B, n)."""
+        """Results up to `ahead` samples before the last one, when there are at least twice as many; x, shape (B, n)."""
+        if not len(x):
+            return x
         if self.state is None:
             x = np.concatenate([self.last.reshape(-1, x.shape[1]), x])
             if len(x) <= self.pad:
