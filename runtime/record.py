@@ -25,7 +25,7 @@ class Record:
     Parameters
     ----------
     t : ndarray, shape (N,), s.   q : ndarray, shape (N, n), rad or m.   tau : ndarray, shape (N, n), N m or N.
-    rate : sampling rate, Hz.
+    rate : sampling rate, Hz.   q_r : what the controller followed, shape (N, n), where it is known.
     files : SHA-256 (of the uncompressed bytes) by file name, for the provenance of results.
     """
 
@@ -35,6 +35,7 @@ class Record:
     rate: float
     name: str = "record"
     files: Mapping[str, str] = field(default_factory=dict)
+    q_r: Array | None = None
 
     def __post_init__(self) -> None:
         t, q, tau = (np.array(x, dtype=float) for x in (self.t, self.q, self.tau))
@@ -47,7 +48,14 @@ class Record:
             raise InputError(f"rate {self.rate} Hz; expected a positive number", file=self.name)
         for label, x in (("t", t[:, None]), ("q", q), ("tau", tau)):
             check_finite(x, [label] if label == "t" else [f"{label}{j + 1}" for j in range(x.shape[1])], self.name)
-        for label, x in (("t", t), ("q", q), ("tau", tau)):
+        given = [("t", t), ("q", q), ("tau", tau)]
+        if self.q_r is not None:
+            q_r = np.array(self.q_r, dtype=float).reshape(len(t), -1)
+            if q_r.shape != q.shape:
+                raise InputError(f"q_r {q_r.shape}, q {q.shape}; expected the same", file=self.name)
+            check_finite(q_r, [f"qr{j + 1}" for j in range(q.shape[1])], self.name)
+            given.append(("q_r", q_r))
+        for label, x in given:
             x.setflags(write=False)
             object.__setattr__(self, label, x)
         object.__setattr__(self, "files", MappingProxyType(dict(self.files)))

@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass, field
 from math import pi
 from typing import Any, Literal
 
+from runtime.controller_settings import Controller
 from runtime.errors import SettingsError
 from runtime.mapping import plain, structure
 
@@ -29,7 +30,8 @@ Number = float | tuple[float, ...]  # one for all joints, or one per joint
 
 @dataclass(frozen=True)
 class Columns:
-    """Names of the columns of a record file, one per joint; `t` is None where the record has no time column.
+    """Names of the columns of a record file, one per joint; `t` is None where the record has no time column; `qr`: the reference positions, where the file
+    of the positions holds them, in the unit and on the side of q.
 
     A name may be the number of the column (from 1) in a file without header, or an (N, n) array of a .npz or .mat file, which stands for its n columns.
     """
@@ -37,6 +39,7 @@ class Columns:
     t: str | None = None
     q: tuple[str, ...] = ()
     tau: tuple[str, ...] = ()
+    qr: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -224,7 +227,7 @@ class CestacSettings:
 
 @dataclass(frozen=True)
 class Study:
-    """All settings. `record` holds one or several records of one robot; `controller` is free (simulation, DIDIM, IV, CLOE)."""
+    """All settings. `record` holds one or several records of one robot; `controller`: the closed loop of simulation, IV, DIDIM and CLOE."""
 
     symgen: int = SCHEMA
     record: tuple[RecordSettings, ...] = ()
@@ -234,7 +237,7 @@ class Study:
     essential: EssentialSettings = field(default_factory=EssentialSettings)
     validate: ValidateSettings = field(default_factory=ValidateSettings)
     cestac: CestacSettings = field(default_factory=CestacSettings)
-    controller: Mapping[str, Any] = field(default_factory=dict)
+    controller: Controller | None = None
 
     def __post_init__(self) -> None:
         _require(self.symgen == SCHEMA, ("symgen",), f"schema {self.symgen}; this version reads {SCHEMA}")

@@ -67,7 +67,7 @@ TX40 = Dataset(
 _EMPS_RECORD: dict[str, Any] = {
     "dataset": "emps",
     "files": ["DATA_EMPS.mat"],
-    "columns": {"t": "t", "q": ["qm"], "tau": ["vir"]},
+    "columns": {"t": "t", "q": ["qm"], "tau": ["vir"], "qr": ["qg"]},
     "scale": {"tau": "gtau"},  # force = gtau*vir, N/V
     "side": "joint",
     "rate": 1000,
@@ -94,6 +94,13 @@ EMPS = Dataset(
         "rows": {"window": [0.0485, None], "trim": 0, "low_speed": 0},  # without the first 49 samples
         "validate": {"record": [{**_EMPS_RECORD, "files": ["DATA_EMPS_PULSES.mat"], "name": "emps_pulses"}]},
         "cestac": {"delta": [1e-6, 2e-5, 5e-5, 1e-4]},  # m
+        "controller": {  # the authors' Simulink diagram
+            "law": {"kind": "cascade", "kp": 160.18, "kv": 243.45, "gain": 35.15065188248547},
+            "rate": 1000,
+            "delay": 1,
+            "velocity": "averaged",
+            "reference": {"record": 0},
+        },
     },
 )
 

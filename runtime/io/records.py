@@ -55,20 +55,22 @@ def read_record(settings: RecordSettings, drives: Drives | None = None, *, folde
     if drives is not None and drives.n != n:
         raise InputError(f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file)
     t, rate = _time(settings, first, names.t, len(q))
-    q = q * _scale(settings.scale.q, first, n, "scale.q") * _position_units(settings, n)
+    unit = _scale(settings.scale.q, first, n, "scale.q") * _position_units(settings, n)
+    q, q_r = q * unit, _reference(first, names.qr, n, unit)
     tau = tau * _scale(settings.scale.tau, last, n, "scale.tau")
     distinct = len({Path(file).name for file in settings.files}) == len(settings.files)
     files = {Path(file).name if distinct else file: digest for file, (_, digest) in zip(settings.files, tables, strict=True)}
     name = settings.name or settings.dataset or paths[0].name.split(".")[0]
     constant = _torque_constant(settings, drives, n)
     if settings.side == "joint":
-        return Record(t, q, tau * constant, rate, name, files)
+        return Record(t, q, tau * constant, rate, name, files, q_r)
     if drives is None:
         raise InputError(
             "side is motor but the robot has no drives; give them in the robot file, or a record of the joint side", file=first.file
         )
     used = replace(drives, torque_constant=constant, coupling=settings.coupling)
-    return Record(t, used.joint_position(q), used.joint_torque(tau), rate, name, files)
+    q_r = None if q_r is None else used.joint_position(q_r)
+    return Record(t, used.joint_position(q), used.joint_torque(tau), rate, name, files, q_r)
 
 
 def read_records(settings: Sequence[RecordSettings], model: GeneratedModel, *, folder: Path | None = None) -> list[Record]:
@@ -96,7 +98,18 @@ def _column_names(settings: RecordSettings, first: Table, last: Table) -> Column
     """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out."""
     given = settings.columns
     t = given.t if given.t is not None or settings.rate is not None or "t" not in first.names else "t"
-    return Columns(t, given.q or _numbered("q", first), given.tau or _numbered("tau", last))
+    qr = given.qr or (_numbered("qr", first) if "qr1" in first.names else ())
+    return Columns(t, given.q or _numbered("q", first), given.tau or _numbered("tau", last), qr)
+
+
+def _reference(table: Table, names: Sequence[str], n: int, unit: Array) -> Array | None:
+    """Reference positions in the unit of q, where the file holds them."""
+    if not names:
+        return None
+    q_r = _finite(table, names)
+    if q_r.shape[1] != n:
+        raise InputError(f"{q_r.shape[1]} reference positions {', '.join(names)}; expected {n}", file=table.file)
+    return q_r * unit
 
 
 def _numbered(quantity: str, table: Table) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from math import pi
 import numpy as np
 
 from runtime.model import GeneratedModel
+from runtime.reference import Reference
 from runtime.study import (
     CestacSettings,
     Decimate,
@@ -25,7 +26,7 @@ from runtime.study import (
     Signals,
     Study,
 )
-from symgen.cli.simulated import Trajectory, recorded
+from symgen.cli.simulated import recorded
 
 Array = np.ndarray
 Jet = Array  # shape (3, N): a function of time, its first and its second derivative
@@ -60,7 +61,7 @@ def haptic_record(model: GeneratedModel, duration: float = DURATION) -> tuple[by
     return recorded(model, motion(duration), SEED, rate=RATE, encoder=ENCODER, noise=NOISE)
 
 
-def motion(duration: float = DURATION) -> Trajectory:
+def motion(duration: float = DURATION) -> Reference:
     """Joints 1, 2, 5; the first LOW/DURATION of the duration is slow."""
     t = np.arange(round(duration * RATE)) / RATE
     low = duration * LOW / DURATION
@@ -72,7 +73,7 @@ def motion(duration: float = DURATION) -> Trajectory:
         joint[0] += centre
         joints.append(joint)
     q, qd, qdd = np.moveaxis(np.array(joints), 0, -1)
-    return Trajectory(t, q, qd, qdd)
+    return Reference(RATE, q, qd, qdd)
 
 
 def triangle(t: Array, period: float, amplitude: float, phase: float) -> Jet:

@@ -7,8 +7,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from runtime.controller_settings import Points
 from runtime.io.datasets import dataset_study
 from runtime.io.records import read_records
+from runtime.reference import point_to_point
 from runtime.study import study_from_mapping
 from symgen.cli import chapter_tables, simulated
 from symgen.cli import demo as module
@@ -65,8 +67,8 @@ def test_offline_recovers_what_was_put_in(offline):
 
 def test_simulated_trajectory_keeps_the_limits():
     with opened_model("tx40") as model:
-        path = simulated.point_to_point(model, 9.0, seed=1)
-        again = simulated.point_to_point(model, 9.0, seed=1)
+        path = point_to_point(model, Points(9.0, 1), 5000.0)
+        again = point_to_point(model, Points(9.0, 1), 5000.0)
         low, high = np.array(model.LIMITS["q"]).T
         assert (path.q >= low).all() and (path.q <= high).all()
         assert (np.abs(path.qd) <= np.array(model.LIMITS["qd"])).all()

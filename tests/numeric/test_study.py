@@ -19,7 +19,7 @@ estimate: {method: ols, weights: none, columns: all}
 essential: {threshold: 1.04}
 validate: {split: [[0, 3.7], [3.7, 7.5]]}
 cestac:   {side: joint, rounding: two-point, delta: [2*pi/10000, 2*pi/5000, 2*pi/2000, 2*pi/1000], runs: 5, seed: 1, columns: essential, torque: null}
-controller: {kp: 160.18}
+controller: {law: {kind: cascade, kp: 160.18}}
 """
 
 
@@ -43,7 +43,7 @@ def test_study_file_of_the_design():
     )
     assert study.record[0].files == ("q.csv.gz", "tau.csv.gz") and study.record[0].side == "motor"
     assert study.rows.window == (0, 7.5)
-    assert study.controller == {"kp": 160.18}
+    assert study.controller.law.kp == 160.18 and study.controller.delay == 0
 
 
 @pytest.mark.parametrize("study", [Study(), study_from_text(DESIGN), *(study_from_mapping(dataset_study(name)) for name in DATASETS)])
