@@ -16,6 +16,7 @@ import numpy as np
 from runtime.estimate import Estimate, aligned, json_text
 from runtime.estimators import linear_system
 from runtime.estimators.linear import System, assemble, standard_deviations
+from runtime.estimators.reduction import Reduction
 from runtime.model import GeneratedModel
 from runtime.observation import Observation
 from runtime.study import EssentialSettings, EstimateSettings
@@ -84,7 +85,7 @@ class Essential:
 
 
 def essential(
-    observation: Observation,
+    observation: Observation | Reduction,
     settings: EssentialSettings | None = None,
     estimate: EstimateSettings | None = None,
     *,

@@ -19,12 +19,12 @@ from scipy.sparse.csgraph import connected_components
 from runtime.errors import InputError
 from runtime.estimate import Estimate, aligned, json_text
 from runtime.estimators import estimate, linear_system
+from runtime.estimators.reduction import Reduction, Window
 from runtime.estimators.solution import unit_columns
 from runtime.observation import Observation
 from runtime.study import EstimateSettings
 
 Array = np.ndarray
-Window = tuple[float | None, float | None]
 
 CORRELATION = 0.9
 """|correlation| of two estimates above which they are reported to trade against each other."""
@@ -126,9 +126,19 @@ class CrossValidation:
         return {"schema": 1, "joints": self.joints, "predictions": self.predictions}
 
 
+def prediction_errors(observation: Observation | Reduction, fit: Estimate) -> tuple[float, tuple[float, ...]]:
+    """100 ||Y - W X|| / ||Y||, in %, over all joints and by joint."""
+    if isinstance(observation, Observation):
+        compared = direct_comparison(observation, fit)
+        return compared.relative_error, tuple(joint.relative_error for joint in compared)
+    joints = observation.columns(fit.names).factor.joints
+    errors, measured = (np.array(x) for x in ([j.residual_norm(fit.X) for j in joints], [j.measured_norm for j in joints]))
+    return _percent(errors, measured), tuple(_percent(e, m) for e, m in zip(errors, measured, strict=True))
+
+
 def cross_validation(
-    fit: Observation,
-    predict: Mapping[str, Observation],
+    fit: Observation | Reduction,
+    predict: Mapping[str, Observation | Reduction],
     settings: EstimateSettings | None = None,
     *,
     essential: Sequence[str] | None = None,
@@ -146,15 +156,14 @@ def cross_validation(
     for columns, names in choices.items():
         found = estimate(fit.columns(names), EstimateSettings(settings.method, settings.weights, "all", settings.options))
         for part, seen in {name: fit, **predict}.items():
-            compared = direct_comparison(seen, found)
-            labels = tuple(joint.joint for joint in compared)
-            errors = tuple(joint.relative_error for joint in compared)
-            predictions.append(Prediction(part, columns, len(names), seen is fit, compared.relative_error, errors))
+            labels = tuple(joint.joint for joint in found.per_joint)
+            total, errors = prediction_errors(seen, found)
+            predictions.append(Prediction(part, columns, len(names), seen is fit, total, errors))
     return CrossValidation(labels, tuple(predictions))
 
 
 def split_validation(
-    observation: Observation, windows: Sequence[Window], settings: EstimateSettings | None = None, *, essential: Sequence[str] | None = None
+    observation: Observation | Reduction, windows: Sequence[Window], settings: EstimateSettings | None = None, *, essential: Sequence[str] | None = None
 ) -> CrossValidation:
     """Cross-validation between windows in s of one record: the first is fitted, the others are predicted."""
     if len(windows) < 2:
@@ -215,7 +224,7 @@ class WeakDirections:
 
 
 def weak_directions(
-    observation: Observation, settings: EstimateSettings | None = None, *, threshold: float = CORRELATION, count: int = 3
+    observation: Observation | Reduction, settings: EstimateSettings | None = None, *, threshold: float = CORRELATION, count: int = 3
 ) -> WeakDirections:
     """Parameters that trade against each other on this observation.
 

@@ -13,6 +13,7 @@ from runtime.errors import SettingsError
 from runtime.estimate import Estimate
 from runtime.estimators import ols, wls
 from runtime.estimators.linear import System, assemble
+from runtime.estimators.reduction import Reduction
 from runtime.model import GeneratedModel
 from runtime.observation import Observation
 from runtime.study import EstimateSettings
@@ -31,17 +32,17 @@ class Estimator(Protocol):
         """The Estimate of one observation."""
 
 
-LINEAR: Mapping[str, Callable[[Observation, EstimateSettings], System]] = {"ols": ols.system, "wls": wls.system}
+LINEAR: Mapping[str, Callable[[Observation | Reduction, EstimateSettings], System]] = {"ols": ols.system, "wls": wls.system}
 """Methods that are one least-squares problem in the rows of the observation."""
 
 
-def linear_system(observation: Observation, settings: EstimateSettings) -> System:
+def linear_system(observation: Observation | Reduction, settings: EstimateSettings) -> System:
     """The factored rows as the method of `settings` weighs them; raises SettingsError for a method that is not one linear system."""
     return _known(LINEAR, settings.method)(observation, settings)
 
 
 def linear_estimate(
-    observation: Observation, settings: EstimateSettings, *, model: GeneratedModel | None, provenance: Mapping[str, Any] | None
+    observation: Observation | Reduction, settings: EstimateSettings, *, model: GeneratedModel | None, provenance: Mapping[str, Any] | None
 ) -> Estimate:
     """Solve the system of a linear method."""
     system = linear_system(observation, settings)
@@ -53,18 +54,20 @@ METHODS: Mapping[str, Estimator] = dict.fromkeys(LINEAR, linear_estimate)
 
 
 def estimate(
-    observation: Observation,
+    observation: Observation | Reduction,
     settings: EstimateSettings | None = None,
     *,
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """Parameters of Y = W X + rho by the method that `settings` names.
+    """Parameters of Y = W X + rho by the method that `settings` names; by ols or wls where the record was read by blocks.
 
     model : gives units, joint numbers and the hash of the robot file.
     provenance : further entries for Estimate.provenance (a seed, the study file).
     """
     settings = settings or EstimateSettings()
+    if isinstance(observation, Reduction):
+        return linear_estimate(observation, settings, model=model, provenance=provenance)
     return _known(METHODS, settings.method)(observation, settings, model=model, provenance=provenance)
 
 

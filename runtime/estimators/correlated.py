@@ -50,10 +50,14 @@ def block_covariance(W: Array, residual: Array, blocks: Array, T: Array) -> Arra
     blocks : ndarray of int, shape (r,), block of each row.
     T : ndarray, shape (b, rank), T T' = (W'W)^-1 of the (weighted) system.
     """
-    r, b = W.shape
-    K = int(blocks.max()) + 1
+    r, K = len(W), int(blocks.max()) + 1
+    return score_covariance(csr_array((residual, (blocks, np.arange(r))), shape=(K, r)) @ W, r, T)
+
+
+def score_covariance(g: Array, r: int, T: Array) -> Array:
+    """C_b, shape (b, b), from the g_k, shape (K, b), of K blocks and r rows in all."""
+    K, b = g.shape
     if K < 2 or r <= b:
         return np.full((b, b), np.nan)
-    g = csr_array((residual, (blocks, np.arange(r))), shape=(K, r)) @ W
     U = (g @ T) @ T.T
     return np.asarray(K / (K - 1) * (r - 1) / (r - b) * (U.T @ U))

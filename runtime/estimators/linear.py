@@ -16,7 +16,8 @@ import scipy
 
 from runtime.errors import SettingsError
 from runtime.estimate import Estimate, JointFit
-from runtime.estimators.correlated import block_covariance, block_of_rows, default_block
+from runtime.estimators.correlated import block_covariance, block_of_rows, default_block, score_covariance
+from runtime.estimators.reduction import Reduction
 from runtime.estimators.solution import Solution, solve
 from runtime.estimators.triangular import Array, Factor, factor
 from runtime.model import GeneratedModel
@@ -31,14 +32,14 @@ OPTIONS = ("rank_tolerance", "block")
 class System:
     """The factored rows of one observation.
 
-    observation : the rows, all columns.
+    observation : the rows, all columns; or what is left of them.
     raw : factor of [W Y]; weighted : factor of the system that is solved. Both hold the columns still in play.
     scales : s_j of each joint, by which its rows are divided; 1 without weights.
     whitener : ndarray, shape (n, n), that multiplies the n rows of one instant instead, or None.
     known_variance : C = (W'W)^-1 of the weighted system, as its rows have variance 1; else C = sigma_rho^2 (W'W)^-1.
     """
 
-    observation: Observation
+    observation: Observation | Reduction
     settings: EstimateSettings
     raw: Factor
     weighted: Factor
@@ -80,9 +81,12 @@ def checked_options(settings: EstimateSettings, known: Sequence[str] = OPTIONS) 
     return settings.options
 
 
-def raw_factor(observation: Observation, settings: EstimateSettings) -> Factor:
+def raw_factor(observation: Observation | Reduction, settings: EstimateSettings) -> Factor:
     """Factor of [W Y] on the columns that `settings` asks for."""
-    full = factor(observation.W, observation.Y, observation.rows, observation.names)
+    if isinstance(observation, Reduction):
+        full = observation.factor
+    else:
+        full = factor(observation.W, observation.Y, observation.rows, observation.names)
     if settings.columns == "all":
         return full
     unknown = [name for name in settings.columns if name not in observation.names]
@@ -107,17 +111,8 @@ def assemble(
 ) -> Estimate:
     """The Estimate of a solved system; `model` gives units, joint numbers and the hash of the robot."""
     observation, names = system.observation, system.names
-    columns = [observation.names.index(name) for name in names]
-    W = observation.W if names == observation.names else observation.W[:, columns]
-    residual = observation.Y - W @ fit.X
     sigma_rho, C = standard_deviations(system, fit)
-    block = float(system.options.get("block", default_block(observation)))
-    if system.whitener is None:
-        weights = np.repeat(1 / np.square(system.scales), observation.rows)
-        C_b = block_covariance(W, residual * weights, block_of_rows(observation, block), fit.T)
-    else:
-        whole = whitened(np.column_stack([W, residual]), system.whitener)
-        C_b = block_covariance(whole[:, :-1], whole[:, -1], block_of_rows(observation, block), fit.T)
+    block, C_b = correlated_covariance(system, fit)
     corrected = np.sqrt(np.diag(C_b))
     corrected[_undetermined(system, fit)] = np.nan
     norms = [joint.residual_norm(fit.X) for joint in system.raw.joints]
@@ -161,6 +156,26 @@ def assemble(
     )
 
 
+def correlated_covariance(system: System, fit: Solution) -> tuple[float, Array]:
+    """Length of the blocks of residuals, s, and the covariance that takes blocks as independent, shape (b, b)."""
+    observation = system.observation
+    columns = [observation.names.index(name) for name in system.names]
+    weights = 1 / np.square(system.scales)
+    if isinstance(observation, Reduction):
+        X = np.zeros(len(observation.names))
+        X[columns] = fit.X
+        g = observation.scores(X, weights)[:, columns]
+        return observation.residual_block, score_covariance(g, system.raw.rows, fit.T)
+    W = observation.W if system.names == observation.names else observation.W[:, columns]
+    residual = observation.Y - W @ fit.X
+    block = float(system.options.get("block", default_block(observation)))
+    blocks = block_of_rows(observation, block)
+    if system.whitener is None:
+        return block, block_covariance(W, residual * np.repeat(weights, observation.rows), blocks, fit.T)
+    whole = whitened(np.column_stack([W, residual]), system.whitener)
+    return block, block_covariance(whole[:, :-1], whole[:, -1], blocks, fit.T)
+
+
 def outcome(system: System, fit: Solution) -> tuple[str, str]:
     """Status and the paragraph that explains it."""
     b = len(system.names)
@@ -193,7 +208,7 @@ def whitened(A: Array, whitener: Array) -> Array:
     return np.asarray(np.einsum("ij,jNc->iNc", whitener, A.reshape(n, -1, A.shape[1])).reshape(A.shape))
 
 
-def describe(observation: Observation, model: GeneratedModel | None = None) -> dict[str, Any]:
+def describe(observation: Observation | Reduction, model: GeneratedModel | None = None) -> dict[str, Any]:
     """Provenance: hashes of the robot file and of the measured files, versions that computed."""
     try:
         own = version("symgen")

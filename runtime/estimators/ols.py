@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from runtime.errors import SettingsError
 from runtime.estimators.linear import System, checked_options, raw_factor
+from runtime.estimators.reduction import Reduction
 from runtime.observation import Observation
 from runtime.study import EstimateSettings
 
 
-def system(observation: Observation, settings: EstimateSettings) -> System:
+def system(observation: Observation | Reduction, settings: EstimateSettings) -> System:
     """The rows as they are."""
     if settings.weights != "none":
         raise SettingsError(f"{settings.weights!r} with method ols; weights belong to method wls", path=("estimate", "weights"))

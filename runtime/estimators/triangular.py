@@ -103,7 +103,7 @@ class Factor:
             raise ValueError(f"no columns {', '.join(unknown)}; the factor has {', '.join(self.names)}")
         kept = [self.names.index(name) for name in names]
         R = triangularise(self.R[:, [*kept, len(self.names)]])
-        return Factor(tuple(names), R, tuple(_select(joint, kept) for joint in self.joints))
+        return Factor(tuple(names), R, tuple(selected(joint, kept) for joint in self.joints))
 
     def drop(self, name: str) -> Factor:
         """The factor without one parameter, by down-dating: deleting column k leaves R triangular above row k.
@@ -116,10 +116,11 @@ class Factor:
         R = np.zeros((b, b))
         R[:k] = np.delete(self.R[:k], k, axis=1)
         R[k:, k:] = triangularise(self.R[k:, k + 1 :])
-        return Factor(tuple(self.names[i] for i in kept), R, tuple(_select(joint, kept) for joint in self.joints))
+        return Factor(tuple(self.names[i] for i in kept), R, tuple(selected(joint, kept) for joint in self.joints))
 
 
-def _select(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
+def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
+    """The columns at the positions `kept` of the Factor, numbered in that order."""
     place = {int(column): position for position, column in enumerate(joint.columns)}
     found = [(new, place[old]) for new, old in enumerate(kept) if old in place]
     columns = np.array([new for new, _ in found], dtype=np.intp)
@@ -127,6 +128,7 @@ def _select(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
 
 
 def stacked(joints: Sequence[JointFactor], b: int) -> Array:
+    """R, shape (b + 1, b + 1), of the stacked factors of all joints."""
     blocks = []
     for joint in joints:
         block = np.zeros((len(joint.R), b + 1))
