@@ -1,0 +1,260 @@
+"""Exciting trajectories: what is asked of them, and how good a motion is (chapter, section 2.2.3).
+
+The observation matrix is judged as an estimator uses it: rows of joint j divided by the deviation s_j of its torque, columns multiplied by the
+size of their parameter, so that parameters are compared by their relative error.
+
+    W_w = diag(1/s_j) W diag(|X_i|)       cond      s_max/s_min of W_w
+                                          logdet    -log det W_w'W_w
+                                          sigma     largest %sigma_i, the root of the diagonal of (W_w'W_w)^-1
+    C = (sum_j W_j'W_j/s_j^2)^-1          predicted covariance, residuals taken as white at the decimated rate
+
+W is that of the identification: the motion, sampled at the controller rate, goes through the filters and the decimation of the study.
+Parameters smaller than a hundredth of the largest of their unit count as if they had that size. `runtime.studies.excitation` searches the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from runtime.errors import InputError, SettingsError
+from runtime.model import GeneratedModel, require
+from runtime.observation import Observation, observe
+from runtime.record import Record
+from runtime.study import Study
+from runtime.trajectories import Family, Motion, family_from_mapping
+
+Array = np.ndarray
+
+SMALLEST = 0.01  # of the largest parameter of the same unit: what a smaller one counts as
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball carried by frame `frame`: centre in that frame, m; radius, m."""
+
+    frame: int
+    radius: float
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not self.radius > 0:
+            raise SettingsError(f"{self.radius}; expected more than 0", path=("radius",))
+
+
+@dataclass(frozen=True)
+class ExcitationSettings:
+    """The search for an exciting motion.
+
+    parts : families in the order they are run through (`runtime.trajectories`), each a mapping with its `family`.
+    criterion : "cond", "logdet" or "sigma".   columns : "essential" (of an estimate), "all" or names.
+    limits : q, qd, qdd, tau in place of those of the robot file: one per joint, or (lower, upper) for q.
+    torque_rms, torque_rate : largest root mean square, N m, and rate of change, N m/s, of each torque; None: unlimited.
+    margin : share of every limit that the optimiser keeps free between its grid points.
+    grid : points of the optimiser, Hz.   rate : controller rate, Hz.   begin : positions at the start; None: free.
+    spheres, apart : balls on the links, and pairs of them (by number, from 1) whose surfaces stay `gap` m from each other; apart: None means
+        every pair on frames that are not next to each other.
+    smooth : v0 of tanh(qd/v0), which stands for sign(qd) inside the optimiser only, rad/s or m/s.
+    torque_sigma : s_j, one per joint, N m; None: those of an estimate, else 1 for every joint.
+    starts : random starts.   iterations : of the optimiser in each of its two stages.   seed : of the starts.
+    """
+
+    parts: tuple[Mapping[str, Any], ...] = (
+        {"family": "fourier", "period": 10.0, "harmonics": 5},
+        {"family": "point-to-point", "points": 7, "travel": 1.0, "blend": 0.25},
+    )
+    criterion: Literal["cond", "logdet", "sigma"] = "cond"
+    columns: Literal["essential", "all"] | tuple[str, ...] = "essential"
+    limits: Mapping[str, Any] = field(default_factory=dict)
+    torque_rms: tuple[float, ...] | None = None
+    torque_rate: tuple[float, ...] | None = None
+    margin: float = 0.02
+    grid: float = 20.0
+    rate: float = 1000.0
+    begin: tuple[float, ...] | None = None
+    spheres: tuple[Sphere, ...] = ()
+    apart: tuple[tuple[int, int], ...] | None = None
+    gap: float = 0.0
+    smooth: float = 0.05
+    torque_sigma: tuple[float, ...] | None = None
+    starts: int = 10
+    iterations: int = 100
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("grid", "rate", "smooth"):
+            _require(getattr(self, name) > 0, name, f"{getattr(self, name)}; expected more than 0")
+        for name in ("starts", "iterations"):
+            _require(getattr(self, name) >= 1, name, f"{getattr(self, name)}; expected at least 1")
+        _require(0 <= self.margin < 1, "margin", f"{self.margin}; expected a share between 0 and 1")
+        _require(len(self.parts) > 0, "parts", "no part; expected at least one family")
+        for pair in self.apart or ():
+            _require(all(1 <= k <= len(self.spheres) for k in pair), "apart", f"{list(pair)}; there are {len(self.spheres)} spheres")
+        _ = self.families
+
+    @property
+    def families(self) -> tuple[Family, ...]:
+        """The parts, made."""
+        return tuple(family_from_mapping(part) for part in self.parts)
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of spheres that stay apart, numbered from 0."""
+        if self.apart is not None:
+            return tuple((a - 1, b - 1) for a, b in self.apart)
+        count = range(len(self.spheres))
+        return tuple((a, b) for a in count for b in count if a < b and abs(self.spheres[a].frame - self.spheres[b].frame) > 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Lower and upper q, largest |qd|, |qdd|, |tau| (inf: unlimited), shape (n,) each; SI."""
+
+    lower: Array
+    upper: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+
+    def of(self, share: float) -> Limits:
+        """The limits with `share` of each kept free; of a range, of its half width."""
+        middle, half = (self.lower + self.upper) / 2, (1 - share) * (self.upper - self.lower) / 2
+        return Limits(middle - half, middle + half, *((1 - share) * x for x in (self.qd, self.qdd, self.tau)))
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """How W is judged: columns `names`, deviation s_j of each joint, shape (n,), and size of each parameter, shape (c,)."""
+
+    names: tuple[str, ...]
+    s: Array
+    size: Array
+
+    def matrix(self, seen: Observation) -> Array:
+        """W_w, shape (r, c)."""
+        return np.asarray(seen.columns(self.names).W / self.s[seen.joints][:, None] * self.size)
+
+    def condition(self, seen: Observation) -> float:
+        """Condition number of W_w; inf where it is singular."""
+        values = np.linalg.svd(np.linalg.qr(self.matrix(seen), mode="r"), compute_uv=False)
+        return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
+
+    def relative_sigma(self, seen: Observation) -> Array:
+        """Predicted %sigma of the parameters, shape (c,), of their size."""
+        R = np.linalg.qr(self.matrix(seen), mode="r")
+        return np.asarray(100 * np.linalg.norm(np.linalg.solve(R, np.eye(len(R))), axis=1))
+
+
+@dataclass(frozen=True)
+class Excess:
+    """A limit that a motion passes: what, joint (from 1), largest value, limit, when."""
+
+    what: str
+    joint: int
+    value: float
+    limit: float
+    time: float
+
+    def __str__(self) -> str:
+        return f"{self.what} of joint {self.joint} is {self.value:.4g} at {self.time:.3f} s, limit {self.limit:.4g}"
+
+
+def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> Limits:
+    """The limits of the robot file, changed by `given`; raises SettingsError where q, qd or qdd has none."""
+    n = len(model.JOINTS)
+    known = {**dict(getattr(model, "LIMITS", None) or {}), **given}
+    missing = [name for name in ("q", "qd", "qdd") if known.get(name) is None]
+    if missing:
+        raise SettingsError(f"{model.NAME} has no limits of {', '.join(missing)}; give them here or in the robot file", path=("limits",))
+    unknown = known.keys() - {"q", "qd", "qdd", "tau"}
+    if unknown:
+        raise SettingsError(f"no limit {', '.join(sorted(unknown))}; there are q, qd, qdd, tau", path=("limits",))
+    found = {}
+    for name in ("qd", "qdd", "tau"):
+        found[name] = np.array(np.broadcast_to(np.asarray(known.get(name, np.inf), dtype=float), (n,)))
+        if not np.all(found[name] > 0):
+            raise SettingsError(f"{name}: {found[name].tolist()}; expected more than 0", path=("limits", name))
+    ranges = [(-float(x), float(x)) if np.ndim(x) == 0 else tuple(map(float, x)) for x in known["q"]]
+    if len(ranges) != n or any(len(x) != 2 or not x[0] < x[1] for x in ranges):
+        raise SettingsError(f"{known['q']}; expected {n} numbers or pairs (lower, upper)", path=("limits", "q"))
+    lower, upper = np.array(ranges).T
+    return Limits(lower, upper, found["qd"], found["qdd"], found["tau"])
+
+
+def weights_of(
+    model: GeneratedModel, settings: ExcitationSettings, X: Mapping[str, float], *, essential: Sequence[str] = (), s: Sequence[float] = ()
+) -> Weights:
+    """Columns, deviations and sizes from the parameters X by name; `essential`, `s`: those of an estimate where there is one."""
+    n = len(model.JOINTS)
+    if settings.columns == "essential":
+        names = tuple(essential) or tuple(model.BASE_PARAMETERS)
+    else:
+        names = tuple(model.BASE_PARAMETERS) if settings.columns == "all" else tuple(settings.columns)
+    unknown = [name for name in names if name not in model.BASE_PARAMETERS]
+    if unknown:
+        raise SettingsError(f"no parameter {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}", path=("columns",))
+    deviation = np.array(settings.torque_sigma or tuple(s) or (1.0,) * n, dtype=float)
+    if deviation.shape != (n,) or not np.all(deviation > 0):
+        raise SettingsError(f"{deviation.tolist()}; expected {n} numbers above 0", path=("torque_sigma",))
+    units = dict(getattr(model, "UNITS", {}))
+    largest: dict[str, float] = {}
+    for name in names:
+        largest[units.get(name, "")] = max(largest.get(units.get(name, ""), 0.0), abs(X[name]))
+    if not all(largest.values()):
+        raise InputError(
+            f"every parameter in {', '.join(u for u, x in largest.items() if not x)} is zero; give values in the robot file or an estimate"
+        )
+    return Weights(names, deviation, np.array([max(abs(X[name]), SMALLEST * largest[units.get(name, "")]) for name in names]))
+
+
+def criterion_of(weights: Weights, seen: Observation, criterion: str) -> float:
+    """The criterion on the rows of the identification, exact; smaller is better."""
+    if criterion == "cond":
+        return weights.condition(seen)
+    if criterion == "sigma":
+        return float(weights.relative_sigma(seen).max())
+    return float(-2 * np.sum(np.log(np.abs(np.diag(np.linalg.qr(weights.matrix(seen), mode="r"))))))
+
+
+def observed(model: GeneratedModel, motion: Motion, study: Study, rate: float) -> Observation:
+    """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The rows' time window is not that of a record."""
+    t, q, *_ = motion.sampled(rate)
+    record = Record(t=t, q=q, tau=np.zeros_like(q), rate=rate, name="planned motion")
+    return observe(model, record, replace(study, rows=replace(study.rows, window=(None, None))))
+
+
+def excesses(
+    model: GeneratedModel, motion: Motion, limits: Limits, settings: ExcitationSettings, X: Array, rate: float | None = None
+) -> list[Excess]:
+    """Limits that the motion passes on the grid of the controller: the worst instant of each joint and quantity. Distances are not among them."""
+    require(model, "inverse_dynamics")
+    functions: Any = model
+    t, q, qd, qdd = motion.sampled(settings.rate if rate is None else rate)
+    tau = functions.inverse_dynamics(q, qd, qdd, X)
+    change = np.abs(np.gradient(tau, t, axis=0))
+    n, inf = q.shape[1], np.inf
+    found = []
+    bounds = [
+        ("position", q, limits.lower, limits.upper),
+        ("velocity", qd, -limits.qd, limits.qd),
+        ("acceleration", qdd, -limits.qdd, limits.qdd),
+        ("torque", tau, -limits.tau, limits.tau),
+        ("rate of torque", change, np.full(n, -inf), np.array(settings.torque_rate or [inf] * n)),
+        ("rms torque", np.sqrt(np.mean(tau**2, axis=0))[None], np.full(n, -inf), np.array(settings.torque_rms or [inf] * n)),
+    ]
+    for what, x, lower, upper in bounds:
+        beyond = np.maximum(x - upper, lower - x)
+        for j in range(n):
+            k = int(np.argmax(beyond[:, j]))
+            if beyond[k, j] > 1e-9 * max(1.0, abs(x[k, j])):
+                limit = upper[j] if x[k, j] > upper[j] else lower[j]
+                found.append(Excess(what, j + 1, float(x[k, j]), float(limit), float(t[k])))
+    return found
+
+
+def _require(ok: bool, name: str, message: str) -> None:
+    if not ok:
+        raise SettingsError(message, path=(name,))
