@@ -17,7 +17,7 @@ import numpy as np
 from runtime.drives import Coupling, Drives
 from runtime.essential import Essential, essential
 from runtime.estimate import Estimate
-from runtime.estimators import estimate
+from runtime.estimators import LINEAR, estimate, linear_companion, point_estimate
 from runtime.model import GeneratedModel
 from runtime.observation import Observation, observe, stack
 from runtime.record import Record
@@ -39,7 +39,8 @@ COUPLINGS: tuple[Coupling, ...] = ("both", "position", "torque", "none")
 class Identification:
     """Results on one robot.
 
-    found : all parameters, the essential ones and the trail between them.   comparison : torques by the essential parameters.
+    found : all parameters, the essential ones and the trail between them; of the linear companion of a method that is not linear.
+    chosen : all parameters by the method of the study.   comparison : torques by the essential parameters, or by `chosen` of such a method.
     validation : one part of the data predicts the others: halves first, then further records.   weak : parameters that trade.
     coupling : fit of all parameters with the off-diagonal part of the drives in both directions, one, or none; empty where there is none.
     """
@@ -49,6 +50,7 @@ class Identification:
     records: tuple[Record, ...]
     observation: Observation
     found: Essential
+    chosen: Estimate
     comparison: Comparison
     validation: tuple[CrossValidation, ...]
     weak: WeakDirections
@@ -67,12 +69,18 @@ class Identification:
     @property
     def every(self) -> Estimate:
         """The fit of all parameters."""
-        return self.found.all_parameters
+        return self.chosen
+
+    @property
+    def carried(self) -> Estimate:
+        """The fit that stands for the robot: of the essential parameters, or of all by a method that needs them all."""
+        return self.found.estimate if self.study.estimate.method in LINEAR else self.chosen
 
     @property
     def predicted_error(self) -> float:
-        """Relative error in % of the essential parameters on the parts of the record that did not give them, the largest."""
-        errors = [p.relative_error for p in self.validation[0].predictions if not p.fitted and p.columns == "essential"]
+        """Relative error in % of the parameters that carry the model on the parts of the record that did not give them, the largest."""
+        columns = "essential" if self.carried is self.found.estimate else "all"
+        errors = [p.relative_error for p in self.validation[0].predictions if not p.fitted and p.columns == columns]
         return max(errors, default=float("nan"))
 
     @property
@@ -84,11 +92,11 @@ class Identification:
                 f"The record {self.name} does not determine {self.model.NAME}: rank {self.every.rank} for {len(self.every.names)} "
                 f"parameters, cannot be told apart: {names}."
             )
-        worst = max(self.found.estimate.per_joint, key=lambda joint: joint.relative_error)
+        worst = max(self.carried.per_joint, key=lambda joint: joint.relative_error)
         named = f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)" if self.observation.n > 1 else ""
         return (
-            f"{len(self.found.names)} of {len(self.every.names)} parameters carry the model of {self.model.NAME}: they explain the record "
-            f"{self.name} to {self.found.estimate.relative_error:.1f} %{named} and predict an "
+            f"{len(self.carried.names)} of {len(self.every.names)} parameters carry the model of {self.model.NAME}: they explain the record "
+            f"{self.name} to {self.carried.relative_error:.1f} %{named} and predict an "
             f"unseen part of it to {self.predicted_error:.1f} %."
         )
 
@@ -125,20 +133,23 @@ def identification(
     records : joint side, as read by study.record.   further : those of study.validate.record, predicted with the parameters found.
     """
     observation = stack([observe(model, record, study) for record in records])
-    found = essential(observation, study.essential, study.estimate, model=model, provenance=provenance)
+    found = essential(observation, study.essential, linear_companion(study.estimate), model=model, provenance=provenance)
+    linear = study.estimate.method in LINEAR
+    chosen = found.all_parameters if linear else estimate(observation, study.estimate, model=model, provenance=provenance)
     windows = study.validate.split or halves(observation)
-    validation = [split_validation(observation, windows, study.estimate, essential=found.names)]
+    validation = [split_validation(observation, windows, study.estimate, essential=found.names, model=model)]
     if further:
         seen = {record.name: observe(model, record, study) for record in further}
         name = ", ".join(record.name for record in records)
-        validation.append(cross_validation(observation, seen, study.estimate, essential=found.names, name=name))
+        validation.append(cross_validation(observation, seen, study.estimate, essential=found.names, name=name, model=model))
     return Identification(
         model=model,
         study=study,
         records=tuple(records),
         observation=observation,
         found=found,
-        comparison=direct_comparison(observation, found.estimate),
+        chosen=chosen,
+        comparison=direct_comparison(observation, found.estimate if linear else chosen),
         validation=tuple(validation),
         weak=weak_directions(observation, study.estimate),
         coupling=coupling_fits(model, study, records),
@@ -163,7 +174,7 @@ def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record]
     for coupling in COUPLINGS:
         pairs = zip(records, study.record, strict=True)
         changed = [recoupled(record, drives.decoupled(settings.coupling), drives.decoupled(coupling)) for record, settings in pairs]
-        fits[coupling] = estimate(stack([observe(model, record, study) for record in changed]), study.estimate, model=model)
+        fits[coupling] = estimate(stack([observe(model, record, study) for record in changed]), point_estimate(study.estimate), model=model)
     return fits
 
 

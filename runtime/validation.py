@@ -18,9 +18,10 @@ from scipy.sparse.csgraph import connected_components
 
 from runtime.errors import InputError
 from runtime.estimate import Estimate, aligned, json_text
-from runtime.estimators import estimate, linear_system
+from runtime.estimators import estimate, linear_companion, linear_system, point_estimate
 from runtime.estimators.reduction import Reduction, Window
 from runtime.estimators.solution import unit_columns
+from runtime.model import GeneratedModel
 from runtime.observation import Observation
 from runtime.study import EstimateSettings
 
@@ -143,18 +144,19 @@ def cross_validation(
     *,
     essential: Sequence[str] | None = None,
     name: str = "fit",
+    model: GeneratedModel | None = None,
 ) -> CrossValidation:
     """Fit on one observation, predict others, with all columns and with the essential ones.
 
-    predict : observations by label; essential : names found before, on the whole record or on the fitted part.
+    predict : observations by label; essential : names found before, on the whole record or on the fitted part.   model : for methods that need it.
     """
-    settings = settings or EstimateSettings()
+    settings = point_estimate(settings or EstimateSettings())
     every = fit.names if settings.columns == "all" else settings.columns
     choices = {"all": tuple(every)} | ({} if essential is None else {"essential": tuple(essential)})
     predictions = []
     labels: tuple[str, ...] = ()
     for columns, names in choices.items():
-        found = estimate(fit.columns(names), EstimateSettings(settings.method, settings.weights, "all", settings.options))
+        found = estimate(fit.columns(names), EstimateSettings(settings.method, settings.weights, "all", settings.options), model=model)
         for part, seen in {name: fit, **predict}.items():
             labels = tuple(joint.joint for joint in found.per_joint)
             total, errors = prediction_errors(seen, found)
@@ -163,7 +165,12 @@ def cross_validation(
 
 
 def split_validation(
-    observation: Observation | Reduction, windows: Sequence[Window], settings: EstimateSettings | None = None, *, essential: Sequence[str] | None = None
+    observation: Observation | Reduction,
+    windows: Sequence[Window],
+    settings: EstimateSettings | None = None,
+    *,
+    essential: Sequence[str] | None = None,
+    model: GeneratedModel | None = None,
 ) -> CrossValidation:
     """Cross-validation between windows in s of one record: the first is fitted, the others are predicted."""
     if len(windows) < 2:
@@ -172,7 +179,7 @@ def split_validation(
     parts = {label: observation.between(t0, t1) for label, (t0, t1) in zip(labels, windows, strict=True)}
     first = labels[0]
     others = {label: part for label, part in parts.items() if label != first}
-    return cross_validation(parts[first], others, settings, essential=essential, name=first)
+    return cross_validation(parts[first], others, settings, essential=essential, name=first, model=model)
 
 
 @dataclass(frozen=True)
@@ -230,7 +237,7 @@ def weak_directions(
 
     threshold : smallest |correlation| reported.   count : number of singular directions.
     """
-    system = linear_system(observation, settings or EstimateSettings())
+    system = linear_system(observation, linear_companion(settings or EstimateSettings()))
     names = system.names
     R, _ = unit_columns(system.weighted.R11)
     _, s, Vt = np.linalg.svd(R)

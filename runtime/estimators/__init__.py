@@ -2,16 +2,18 @@
 
 ols   ordinary least squares               runtime/estimators/ols.py
 wls   least squares weighted by joint      runtime/estimators/wls.py
+feasible  least squares among physical robots, extra consistency    runtime/estimators/feasible.py
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, Protocol, TypeVar
 
 from runtime.errors import SettingsError
 from runtime.estimate import Estimate
-from runtime.estimators import ols, wls
+from runtime.estimators import feasible, ols, wls
 from runtime.estimators.linear import System, assemble
 from runtime.estimators.reduction import Reduction
 from runtime.model import GeneratedModel
@@ -20,7 +22,7 @@ from runtime.study import EstimateSettings
 
 T = TypeVar("T")
 
-__all__ = ["LINEAR", "METHODS", "estimate", "linear_system"]
+__all__ = ["LINEAR", "METHODS", "estimate", "linear_companion", "linear_system", "point_estimate"]
 
 
 class Estimator(Protocol):
@@ -41,6 +43,21 @@ def linear_system(observation: Observation | Reduction, settings: EstimateSettin
     return _known(LINEAR, settings.method)(observation, settings)
 
 
+def linear_companion(settings: EstimateSettings) -> EstimateSettings:
+    """The settings themselves where their method is one linear system; else least squares with the same weights and columns.
+
+    Essential parameters and weak directions of such a method are those of its companion.
+    """
+    if settings.method in LINEAR:
+        return settings
+    return EstimateSettings("ols" if settings.weights == "none" else "wls", settings.weights, settings.columns)
+
+
+def point_estimate(settings: EstimateSettings) -> EstimateSettings:
+    """The settings of an estimate whose deviations nobody reads: without resampling."""
+    return replace(settings, options={**settings.options, "bootstrap": 0}) if settings.method == "feasible" else settings
+
+
 def linear_estimate(
     observation: Observation | Reduction, settings: EstimateSettings, *, model: GeneratedModel | None, provenance: Mapping[str, Any] | None
 ) -> Estimate:
@@ -49,7 +66,7 @@ def linear_estimate(
     return assemble(system, system.solve(), model=model, provenance=provenance)
 
 
-METHODS: Mapping[str, Estimator] = dict.fromkeys(LINEAR, linear_estimate)
+METHODS: Mapping[str, Estimator] = {**dict.fromkeys(LINEAR, linear_estimate), "feasible": feasible.feasible}
 """Every method, by the name that `estimate.method` of a study gives it."""
 
 

@@ -41,9 +41,10 @@ def identification_sections(found: Identification) -> list[Section]:
 def torque_section(found: Identification) -> Section:
     """Fig. 4 of the chapter, one figure per joint."""
     unit = torque_unit(found)
+    which = "the essential" if found.carried is found.found.estimate else "all"
     images = [
         Image(
-            f"Joint {joint.joint}: {found.source}, predicted by the essential parameters, and error; {joint.relative_error:.2f} % of the {found.source} norm",
+            f"Joint {joint.joint}: {found.source}, predicted by {which} parameters, and error; {joint.relative_error:.2f} % of the {found.source} norm",
             plots.svg(plots.joint_overlay(joint, unit, found.source)),
             f"Torque of joint {joint.joint} against time: {found.source}, predicted, error",
         )

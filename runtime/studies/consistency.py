@@ -1,9 +1,10 @@
 """Semidefinite programs over the standard parameters: cvxpy and Clarabel, extra `consistency`. cvxpy only here.
 
-    closest     min ||R (z - K chi)||^2 + weight D(chi)        subject to  P >= margin 1 of every condition, rows, K chi = X where asked
-    margin      max t                                          subject to  P >= t 1 of every condition, rows, K chi = X
+    closest     min ||R chi - z||^2 + weight D(chi)    subject to  P >= least 1 of every condition, rows, chi in a Space
+    margin      max t                                  subject to  P >= t 1 of every condition, rows, chi in a Space
 
-All unknowns are chi = scale * u: interior point methods want entries near one. Clarabel is a deterministic solver: same problem, same bits.
+The unknowns w of chi = origin + basis w have sizes near one, as interior point methods want. K chi = X is a Space, not an equation, and holds to
+rounding. Clarabel is deterministic: same problem, same bits.
 
 Reference: Goulart and Chen (2024) for Clarabel; Diamond and Boyd (2016) for cvxpy.
 """
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from scipy.linalg import null_space
 
 from runtime.errors import InputError
 from runtime.physical import Condition
@@ -23,9 +25,10 @@ from runtime.physical import Condition
 Array = np.ndarray
 Distance = Literal["none", "euclidean", "entropic", "pullback"]
 
-TOLERANCES = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-11}
+TOLERANCES = ((1e-12, 1e-11), (1e-9, 1e-9))  # of the gap and of the constraints, tried in this order
 SOLVED = ("optimal", "optimal_inaccurate")
-FURTHEST = 1e3  # largest margin, SI: the problem of `margin` has a solution whatever X leaves open
+FURTHEST = 1.0  # largest margin, SI, and ...
+LARGEST = 1e4  # largest unknown, in units of its size: the problem of `margin` has a solution whatever K leaves open
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,18 +40,43 @@ class Rows:
     lower: Array
     upper: Array
 
-    def without(self, name: str) -> Rows:
-        """The rows of other names."""
-        kept = [k for k, own in enumerate(self.names) if own != name]
-        return Rows(tuple(self.names[k] for k in kept), self.A[kept], self.lower[kept], self.upper[kept])
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """chi = origin + basis w: origin (p,), basis (p, m)."""
+
+    origin: Array
+    basis: Array
+
+
+def everything(scale: Array) -> Space:
+    """Every chi, in units of `scale`, (p,)."""
+    return Space(np.zeros(len(scale)), np.diag(scale))
+
+
+def solutions(K: Array, X: Array, scale: Array) -> Space:
+    """Every chi with K chi = X, K of full row rank."""
+    return Space(scale * np.linalg.lstsq(K * scale, X, rcond=None)[0], scale[:, None] * null_space(K * scale))
+
+
+def within(space: Space, rows: Rows) -> tuple[Space, Rows]:
+    """`space` with the rows that are equations fulfilled (nearest to that where they contradict it), and the other rows."""
+    equal = rows.lower == rows.upper
+    others = Rows(tuple(n for n, e in zip(rows.names, equal, strict=True) if not e), *(x[~equal] for x in (rows.A, rows.lower, rows.upper)))
+    if not equal.any():
+        return space, others
+    A = rows.A[equal]
+    origin = space.origin + space.basis @ np.linalg.lstsq(A @ space.basis, rows.lower[equal] - A @ space.origin, rcond=None)[0]
+    return Space(origin, space.basis @ null_space(A @ space.basis)), others
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Where the inertial parameters are pulled to: chi0 (p,), and its pseudo-inertias by name of the condition."""
+    """Where the inertial parameters are pulled to, chi0 (p,), in units of scale, (p,)."""
 
     kind: Distance
     chi0: Array
+    scale: Array
     numbers: tuple[int, ...]  # the inertial parameters among the p
     weight: float
 
@@ -77,7 +105,8 @@ def require_solver() -> Any:
         import cvxpy
     except ImportError:
         raise InputError("physical consistency needs cvxpy; pip install symgen[consistency]") from None
-    if cvxpy.CLARABEL not in cvxpy.installed_solvers():
+    installed: Any = cvxpy.installed_solvers
+    if cvxpy.CLARABEL not in installed():
         raise InputError("physical consistency needs the solver Clarabel; pip install symgen[consistency]")
     return cvxpy
 
@@ -87,83 +116,68 @@ def closest(
     z: Array,
     conditions: Sequence[Condition],
     rows: Rows,
-    scale: Array,
+    space: Space,
     *,
-    margin: float,
+    least: float,
     pull: Reference | None = None,
-    equality: tuple[Array, Array] | None = None,
 ) -> Found:
-    """chi nearest to R chi = z, shapes (m, p) and (m,), scaled by the caller so that ||z|| is about 1.
+    """chi of `space` nearest to R chi = z, shapes (m, p) and (m,), scaled by the caller so that ||z|| is about 1.
 
-    margin : least eigenvalue of every condition, SI.   equality : (K, X) with K chi = X.
+    least : smallest eigenvalue of every condition, SI.
     """
     cp = require_solver()
-    u = cp.Variable(len(scale))
-    constraints, blocks = _constraints(cp, u, conditions, rows, scale, margin)
-    if equality is not None:
-        constraints.append(_balanced(equality[0] * scale, equality[1], u))
-    criterion = cp.sum_squares((R * scale) @ u - z)
+    space, rows = within(space, rows)
+    w = cp.Variable(space.basis.shape[1])
+    chi = space.origin + space.basis @ w
+    constraints, blocks = _constraints(cp, chi, conditions, rows, least)
+    criterion = cp.sum_squares((R @ space.basis) @ w - (z - R @ space.origin))
     if pull is not None:
-        criterion = criterion + pull.weight * _distance(cp, u, conditions, scale, pull)
-    return _solved(cp, cp.Problem(cp.Minimize(criterion), constraints), u, scale, blocks)
+        criterion = criterion + pull.weight * _distance(cp, chi, conditions, pull)
+    return _solved(cp, cp.Problem(cp.Minimize(criterion), constraints), w, space, blocks)
 
 
-def margin(K: Array, X: Array, conditions: Sequence[Condition], rows: Rows, scale: Array) -> Found:
-    """The largest t with every P - t 1 positive semidefinite and K chi = X: `value`; negative where no physical robot has X."""
+def margin(conditions: Sequence[Condition], rows: Rows, space: Space) -> Found:
+    """The largest t with every P - t 1 positive semidefinite: `value`; negative where no physical robot is in `space`."""
     cp = require_solver()
-    u, t = cp.Variable(len(scale)), cp.Variable()
-    constraints, blocks = _constraints(cp, u, conditions, rows, scale, t)
-    constraints += [_balanced(K * scale, X, u), t <= FURTHEST]
-    return _solved(cp, cp.Problem(cp.Maximize(t), constraints), u, scale, blocks)
+    space, rows = within(space, rows)
+    w, t = cp.Variable(space.basis.shape[1]), cp.Variable()
+    constraints, blocks = _constraints(cp, space.origin + space.basis @ w, conditions, rows, t)
+    return _solved(cp, cp.Problem(cp.Maximize(t), [*constraints, t <= FURTHEST, w <= LARGEST, w >= -LARGEST]), w, space, blocks)
 
 
-def _constraints(
-    cp: Any, u: Any, conditions: Sequence[Condition], rows: Rows, scale: Array, least: Any
-) -> tuple[list[Any], dict[str, Any]]:
+def _constraints(cp: Any, chi: Any, conditions: Sequence[Condition], rows: Rows, least: Any) -> tuple[list[Any], dict[str, Any]]:
     """Conditions and rows; the conditions also by name."""
     blocks = {}
     for c in conditions:
-        P = _matrix(cp, u, c, scale)
+        P = _matrix(cp, chi, c)
         m = c.B.shape[1]
         blocks[c.name] = P - least * np.eye(m) >> 0 if m > 1 else P[0, 0] >= least
     constraints = list(blocks.values())
-    for A, low, high in zip(rows.A * scale, rows.lower, rows.upper, strict=True):
-        size = float(np.linalg.norm(A)) or 1.0
-        if low == high:
-            constraints.append((A / size) @ u == low / size)
-            continue
-        constraints += [(A / size) @ u >= low / size] if np.isfinite(low) else []
-        constraints += [(A / size) @ u <= high / size] if np.isfinite(high) else []
+    for A, low, high in zip(rows.A, rows.lower, rows.upper, strict=True):
+        constraints += [A @ chi >= low] if np.isfinite(low) else []
+        constraints += [A @ chi <= high] if np.isfinite(high) else []
     return constraints, blocks
 
 
-def _matrix(cp: Any, u: Any, c: Condition, scale: Array) -> Any:
-    """sum_k chi_k B_k as a symmetric expression."""
+def _matrix(cp: Any, chi: Any, c: Condition) -> Any:
+    """sum_k chi_k B_k as an expression."""
     m = c.B.shape[1]
-    flat = c.B.reshape(len(c.numbers), m * m).T * scale[list(c.numbers)]
-    return cp.reshape(flat @ u[list(c.numbers)], (m, m), order="C")
+    return cp.reshape(c.B.reshape(len(c.numbers), m * m).T @ chi[list(c.numbers)], (m, m), order="C")
 
 
-def _balanced(K: Array, X: Array, u: Any) -> Any:
-    """K u = X with rows of norm 1."""
-    size = np.linalg.norm(K, axis=1)
-    size = np.where(size > 0, size, 1.0)
-    return (K / size[:, None]) @ u == X / size
-
-
-def _distance(cp: Any, u: Any, conditions: Sequence[Condition], scale: Array, pull: Reference) -> Any:
+def _distance(cp: Any, chi: Any, conditions: Sequence[Condition], pull: Reference) -> Any:
     """D(chi): ||(chi - chi0)/scale||^2 over the inertial parameters; or over the links
 
     entropic  tr(P0^-1 P) - log det P + log det P0 - 4        pullback  tr((P0^-1 (P - P0))^2)/2 = ||P0^-1/2 (P - P0) P0^-1/2||^2 / 2
     """
     numbers = list(pull.numbers)
     if pull.kind == "euclidean":
-        return cp.sum_squares(u[numbers] - pull.chi0[numbers] / scale[numbers])
+        return cp.sum_squares(cp.multiply(1 / pull.scale[numbers], chi[numbers] - pull.chi0[numbers]))
     total: Any = 0.0
     for c in conditions:
         if c.name.startswith("link "):
             L = np.linalg.inv(np.linalg.cholesky(c.matrix(pull.chi0)))
-            whitened = L @ _matrix(cp, u, c, scale) @ L.T  # the identity at chi0
+            whitened = L @ _matrix(cp, chi, c) @ L.T  # the identity at chi0
             whitened = (whitened + whitened.T) / 2
             if pull.kind == "entropic":
                 total = total + cp.trace(whitened) - cp.log_det(whitened) - 4.0
@@ -172,14 +186,19 @@ def _distance(cp: Any, u: Any, conditions: Sequence[Condition], scale: Array, pu
     return total
 
 
-def _solved(cp: Any, problem: Any, u: Any, scale: Array, blocks: Mapping[str, Any]) -> Found:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # "may be inaccurate": the status says it
-            problem.solve(solver=cp.CLARABEL, **TOLERANCES)
-    except cp.error.SolverError as e:
-        return Found(f"solver error: {e}", np.full(len(scale), np.nan), float("nan"), {})
-    if problem.status not in SOLVED:
-        return Found(problem.status, np.full(len(scale), np.nan), float("nan"), {})
+def _solved(cp: Any, problem: Any, w: Any, space: Space, blocks: Mapping[str, Any]) -> Found:
+    status = ""
+    for gap, feasible in TOLERANCES:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # "may be inaccurate": the status says it
+                problem.solve(solver=cp.CLARABEL, tol_gap_abs=gap, tol_gap_rel=gap, tol_feas=feasible)
+            status = problem.status
+        except cp.error.SolverError:
+            status = "Clarabel failed"
+        if status in SOLVED:
+            break
+    if status not in SOLVED:
+        return Found(status, np.full(len(space.origin), np.nan), float("nan"), {})
     duals = {name: float(np.trace(np.atleast_2d(block.dual_value))) for name, block in blocks.items()}
-    return Found(problem.status, np.asarray(scale * u.value), float(problem.value), duals)
+    return Found(status, space.origin + space.basis @ w.value, float(problem.value), duals)

@@ -20,6 +20,7 @@ from symgen.cli.session import (
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
+    from runtime.estimate import Estimate
     from runtime.identification import Identification
 
 
@@ -56,11 +57,20 @@ def console_text(found: Identification) -> str:
         + " ".join(f"{joint.relative_error:.2f}" for joint in fit.per_joint)
         for key, fit in found.coupling.items()
     )
-    fit = found.found.estimate if found.every.status != "rank-deficient" else found.every
+    fit = found.carried if found.every.status != "rank-deficient" else found.every
     groups = "; ".join(", ".join(group) for group in found.weak.groups) or "none"
-    parts = [fit.to_table(), found.found.to_table(), *(part.to_table() for part in found.validation)]
+    parts = [fit.to_table(), physical_text(fit), found.found.to_table(), *(part.to_table() for part in found.validation)]
     parts += [f"parameters that trade against each other (|correlation| above {found.weak.threshold:g}): {groups}", coupling, found.verdict]
     return "\n\n".join(part for part in parts if part)
+
+
+def physical_text(fit: Estimate) -> str:
+    """Eigenvalues of a feasible estimate; empty for other methods."""
+    if "standard" not in fit.details:
+        return ""
+    from runtime.report.physical import eigenvalue_table
+
+    return eigenvalue_table(fit)
 
 
 def estimate_json(found: Identification) -> str:
@@ -76,27 +86,29 @@ def identification_files(found: Identification, study: str) -> dict[str, str | b
     """Contents of the output folder, by file name."""
     from runtime.report import plots
     from runtime.report.html import Page, Section, render
+    from runtime.report.physical import physical_section, standard_csv
     from runtime.report.sections import identification_sections, parameters_csv, torque_unit
 
-    unit = torque_unit(found)
+    unit, physical = torque_unit(found), "standard" in found.every.details
     overlay, residuals = plots.torque_overlay(found.comparison, unit, found.source), plots.residual_histogram(found.comparison, unit)
     settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
     page = Page(
         title=f"{found.model.NAME}: identification on {found.name}",
         warning=SIMULATED_WARNING if found.source == "simulated" else "",
         verdict=found.verdict,
-        sections=[*identification_sections(found), settings],
+        sections=[*identification_sections(found), *([physical_section(found.every)] if physical else []), settings],
         footer=provenance_line(found),
     )
     return {
         "report.html": render(page),
         "estimate.json": estimate_json(found),
         "parameters.csv": parameters_csv(found),
-        "parameters.tex": found.found.estimate.to_latex(),
+        "parameters.tex": found.carried.to_latex(),
         "study.yaml": study,
         "torques.png": plots.png(overlay),
         "torques.svg": plots.svg(overlay),
         "residuals.png": plots.png(residuals),
+        **({"standard_parameters.csv": standard_csv(found.every)} if physical else {}),
     }
 
 

@@ -1,0 +1,184 @@
+"""Feasible least squares: the parameters nearest to the record that a physical robot can have (extra `consistency`).
+
+    min ||R (z - K chi)||^2 + weight D(chi)      subject to  P_j(chi) >= margin 1, forms >= margin 1, Ia, FV, FS >= margin, limits
+    X = K chi                                    R z = Q'Y, W = Q R
+
+W is factored once and b rows enter the semidefinite program (`runtime.studies.consistency`); the conditions are those of `runtime.physical`. All base
+parameters are fitted, essential or not: a condition ties every parameter of a link. With the columns of some parameters alone, the others
+are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls. Where least squares is feasible, it is the solution.
+
+options (all of `runtime.feasibility.Limits` too):
+    margin     smallest eigenvalue of every condition, SI; 1e-6
+    prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from the values of the robot file
+    weight     of D, a number, or "auto": the largest, to half a decade, that raises the residual norm by at most 1 %
+    bootstrap  resampled records (blocks of time) behind `sigma_corrected`, 0 for none; seed
+
+sigma and covariance are those of least squares without conditions, eq. (10): the theory of estimates on the boundary of a cone has no such
+formula. `sigma_corrected` is the scatter of the bootstrap, conditions included. A parameter held by an active condition is told by `details`.
+
+`fitted` takes any R and z: the feasible form of instrumental variables has R = L^-1 Z'V W and z' = L^-1 Z'V Y, L L' = Z'V Z.
+
+Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018); Lee, Wensing and Park (2020) for the distances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from runtime.errors import InputError, SettingsError
+from runtime.estimate import Estimate
+from runtime.estimators import ols, wls
+from runtime.estimators.correlated import block_of_rows, default_block
+from runtime.estimators.linear import System, assemble
+from runtime.estimators.triangular import Array, Factor, factor
+from runtime.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
+from runtime.mapping import structure
+from runtime.model import GeneratedModel
+from runtime.observation import Observation
+from runtime.physical import PhysicalModel, physical_model
+from runtime.studies.consistency import Distance, closest, everything
+from runtime.study import EstimateSettings
+
+INCREASE = 1.01  # of the residual norm that weight: auto allows
+WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)
+ACTIVE = 2.0  # a condition within this factor of the margin is active
+
+
+@dataclass(frozen=True)
+class Options(Limits):
+    """estimate.options of method feasible."""
+
+    margin: float = 1e-6
+    prior: Distance = "none"
+    weight: float | Literal["auto"] = "auto"
+    bootstrap: int = 30
+    seed: int = 1
+    linear: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.margin > 0:
+            raise SettingsError(f"{self.margin}; expected a positive number", path=("margin",))
+        if self.weight != "auto" and self.weight < 0:
+            raise SettingsError(f"{self.weight}; expected auto, or 0 or more", path=("weight",))
+        if self.bootstrap == 1 or self.bootstrap < 0 or self.seed < 0:
+            raise SettingsError(
+                f"{self.bootstrap} runs, seed {self.seed}; expected 0 or at least 2 runs, and a seed from 0", path=("bootstrap",)
+            )
+
+
+def feasible(
+    observation: Observation,
+    settings: EstimateSettings,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """The feasible Estimate; `details` holds the standard parameters, the smallest eigenvalues, and what least squares gave."""
+    if model is None:
+        raise InputError("method feasible needs the model: it knows which parameters belong to one link")
+    options = structure(Options, settings.options, ("estimate", "options"))
+    physical = physical_model(model)
+    system = linear(observation, settings, options)
+    free = system.solve()
+    judged = feasibility(physical, system.names, free.X, options)
+    if judged.feasible and judged.margin >= options.margin and options.prior == "none":
+        chi, weight = judged.chi, 0.0
+        X = free.X
+    else:
+        chi, weight = weighed(system.weighted, physical, options)
+        X = physical.rows(system.names) @ chi
+    chi = nearest_standard(physical, system.names, X, chi, options)
+    found = replace(free, X=X, residual_norm=residual_norm(system.weighted, X))
+    estimate = assemble(replace(system, settings=settings), found, model=model, provenance=provenance)
+    smallest = physical.smallest(chi)
+    active = [name for name, value in smallest.items() if value < ACTIVE * options.margin]
+    without = assemble(system, free, model=model)
+    details = {
+        "standard": physical.named(chi),
+        "smallest_eigenvalues": smallest,
+        "active": active,
+        "prior": options.prior,
+        "weight": weight,
+        "bootstrap": options.bootstrap,
+        "least_squares": {
+            "method": system.settings.method,
+            "feasible": judged.feasible,
+            "margin": judged.margin,
+            "blocking": [{"condition": name, "margin": t} for name, t in judged.blocking],
+            "relative_error": without.relative_error,
+            "residual_norm": without.residual_norm,
+            "X": without.X,
+        },
+    }
+    message = " ".join(part for part in (estimate.message, told(system, judged.text, active, estimate, without)) if part)
+    scatter = bootstrapped(observation, system, physical, options, weight) if options.bootstrap else estimate.sigma_corrected
+    return replace(estimate, message=message, details=details, sigma_corrected=scatter)
+
+
+def linear(observation: Observation, settings: EstimateSettings, options: Options) -> System:
+    """The rows as ols or wls weighs them."""
+    if settings.weights == "none":
+        return ols.system(observation, EstimateSettings("ols", "none", settings.columns, options.linear))
+    return wls.system(observation, EstimateSettings("wls", settings.weights, settings.columns, options.linear))
+
+
+def weighed(rows: Factor, physical: PhysicalModel, options: Options) -> tuple[Array, float]:
+    """chi of a factored system, and the weight of D."""
+    K = physical.rows(rows.names)
+    size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
+
+    def at(weight: float) -> Array:
+        return fitted(rows.R11 @ K / size, rows.r12 / size, physical, options, weight)
+
+    if options.prior == "none" or options.weight != "auto":
+        weight = 0.0 if options.prior == "none" else float(options.weight)
+        return at(weight), weight
+    allowed = INCREASE * residual_norm(rows, K @ at(0.0))
+    for weight in WEIGHTS:
+        chi = at(float(weight))
+        if residual_norm(rows, K @ chi) <= allowed:
+            return chi, float(weight)
+    return at(0.0), 0.0
+
+
+def fitted(R: Array, z: Array, physical: PhysicalModel, options: Options, weight: float = 0.0) -> Array:
+    """chi, shape (p,), of min ||R chi - z||^2 + weight D(chi) under the conditions; R (m, p), z (m,), ||z|| about 1."""
+    rows, space = limit_rows(physical, options), everything(scales(physical))
+    pull = pulled(physical, options.prior, weight)
+    found = closest(R, z, physical.conditions, rows, space, least=options.margin, pull=pull)
+    if not found.solved:
+        raise InputError(unsolved(found.status, rows))
+    return found.chi
+
+
+def residual_norm(rows: Factor, X: Array) -> float:
+    """||Y - W X|| of a factored system."""
+    return float(np.hypot(rows.r22, np.linalg.norm(rows.R11 @ X - rows.r12)))
+
+
+def bootstrapped(observation: Observation, system: System, physical: PhysicalModel, options: Options, weight: float) -> Array:
+    """Scatter of X, shape (b,), over records whose blocks of time are drawn with replacement; weights of the joints stay."""
+    block = block_of_rows(observation, default_block(observation))
+    blocks = int(block.max()) + 1
+    rng = np.random.default_rng(options.seed)
+    fixed = replace(options, weight=weight)
+    K, names = physical.rows(system.names), system.names
+    W = observation.W[:, [observation.names.index(name) for name in names]]
+    runs = []
+    for _ in range(options.bootstrap):
+        times = np.sqrt(np.bincount(rng.integers(blocks, size=blocks), minlength=blocks))[block]
+        drawn = factor(W * times[:, None], observation.Y * times, observation.rows, names).weighted(1 / np.array(system.scales))
+        runs.append(K @ weighed(drawn, physical, fixed)[0])
+    return np.asarray(np.std(runs, axis=0, ddof=1))
+
+
+def told(system: System, judged: str, active: list[str], estimate: Estimate, without: Estimate) -> str:
+    """What the conditions changed, in words."""
+    return (
+        f"Least squares ({system.settings.method}) is {judged}. With the conditions the relative error is {estimate.relative_error:.3f} % "
+        f"instead of {without.relative_error:.3f} %; at their limit: {', '.join(active) or 'none'}."
+    )
