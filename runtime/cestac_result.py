@@ -20,9 +20,8 @@ is large do not decide; the result says which ones did. Section 4.1.4 calls the 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -31,6 +30,7 @@ from scipy.special import stdtrit
 
 from runtime.estimate import Estimate, aligned, json_text
 from runtime.observation import Observation
+from runtime.runs import Runs
 
 Array = np.ndarray
 
@@ -42,6 +42,8 @@ DECIDING = 10.0
 """%sigma (11) of the reference above which a parameter does not decide: in Table 2, MX3, OFFSET4 and OFFSET6."""
 CONFIDENCE = 0.95
 """Probability of the Student intervals."""
+LISTED = 1000
+"""Largest number of runs that the JSON text lists; beyond, they are in the archives of the checkpoint (`runtime.checkpoint`)."""
 MOST_RUNS = 100_000
 """Largest number of runs that `runs_needed` answers."""
 
@@ -65,16 +67,6 @@ class Level:
         return " + ".join(parts) or "none"
 
 
-@dataclass(frozen=True)
-class Run:
-    """One run: parameters in column order, and ||Y - W_CESTAC X|| in N m."""
-
-    level: int
-    run: int
-    X: tuple[float, ...]
-    residual_norm: float
-
-
 @dataclass(frozen=True, eq=False)
 class LevelResult:
     """One resolution. Arrays have shape (b,), in the order of the names.
@@ -86,7 +78,7 @@ class LevelResult:
     """
 
     level: Level
-    runs: tuple[Run, ...]
+    runs: Runs
     mean: Array
     sigma: Array
     relative_sigma: Array
@@ -130,6 +122,11 @@ class Cestac:
         """The worst verdict of the levels."""
         return max((result.verdict for result in self.levels), key=("unbiased", "doubtful", "biased").index, default="unbiased")
 
+    @property
+    def lists_runs(self) -> bool:
+        """Whether the JSON text holds every run."""
+        return sum(len(level.runs) for level in self.levels) <= LISTED
+
     def to_table(self) -> str:
         """As the chapter's Table 3: parameters by levels, then the residual and the verdict."""
         results = self.levels
@@ -155,7 +152,7 @@ class Cestac:
         return aligned(lines)
 
     def to_json(self) -> str:
-        """JSON text of everything, every run included."""
+        """JSON text of everything; every run included, up to LISTED of them."""
         return json_text(self.summary())
 
     def summary(self) -> dict[str, Any]:
@@ -167,16 +164,16 @@ class Cestac:
             "relative_sigma_LS": self.reference.relative_sigma,
             "deciding": self.deciding,
             "verdict": self.verdict,
-            "levels": self.levels,
+            "levels": [self._level_summary(level) for level in self.levels],
             "settings": self.settings,
             "provenance": self.provenance,
         }
 
-
-def runs_from_json(text: str) -> tuple[Run, ...]:
-    """The runs that `Cestac.to_json` wrote: what `cestac(finished=...)` does not repeat."""
-    levels = json.loads(text)["levels"]
-    return tuple(Run(r["level"], r["run"], tuple(r["X"]), r["residual_norm"]) for level in levels for r in level["runs"])
+    def _level_summary(self, level: LevelResult) -> dict[str, Any]:
+        """The fields of one level; of many runs, their number and the number solved by normal equations stand for them."""
+        runs = list(level.runs) if self.lists_runs else None
+        counts = {"run_count": len(level.runs), "by_normal_equations": int(level.runs.normal.sum())}
+        return {**{f.name: getattr(level, f.name) for f in fields(level)}, "runs": runs, **counts}
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:
@@ -184,14 +181,13 @@ def deciding_names(reference: Estimate) -> tuple[str, ...]:
     return tuple(name for name, relative in zip(reference.names, reference.relative_sigma, strict=True) if relative <= DECIDING)
 
 
-def level_result(level: Level, runs: Sequence[Run], measured: Observation, reference: Estimate) -> LevelResult:
+def level_result(level: Level, runs: Runs, measured: Observation, reference: Estimate) -> LevelResult:
     """Eqs. (18)-(22) and the verdict of one level; `measured` is the unperturbed system with the columns of the runs."""
-    X = np.array([run.X for run in runs])
-    N = len(X)
+    X, N = runs.X, len(runs)
     mean, sigma = X.mean(axis=0), X.std(axis=0, ddof=1)
     rho_ls, norm_Y = reference.residual_norm, float(np.linalg.norm(measured.Y))
     rho = float(np.linalg.norm(measured.Y - measured.W @ mean))
-    own = float(np.mean([run.residual_norm for run in runs]))
+    own = float(runs.residual_norm.mean())
     with np.errstate(divide="ignore", invalid="ignore"):
         e = 100 * np.abs(1 - mean / reference.X)
         spread = 100 * sigma / np.abs(reference.X)
@@ -203,7 +199,7 @@ def level_result(level: Level, runs: Sequence[Run], measured: Observation, refer
     needed = runs_needed(float(spread[decisive].max(initial=0.0)))
     return LevelResult(
         level=level,
-        runs=tuple(runs),
+        runs=runs,
         mean=mean,
         sigma=sigma,
         relative_sigma=relative_sigma,

@@ -2,23 +2,30 @@
 
 A task is a pure function of its key and of one context. The context travels once, when a process starts. Processes are spawned, never forked
 (a fork after BLAS has started its threads may hang), with one BLAS thread each: several would fight for the cores, and their number could
-change the last bit of a sum.
+change the last bit of a sum. A process that dies takes nothing with it: its keys are given to new ones. More than one machine:
+`runtime.studies.distributed`.
 """
 
 from __future__ import annotations
 
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import Any, TypeVar
+
+from runtime.errors import InputError
 
 K = TypeVar("K")
 C = TypeVar("C")
 R = TypeVar("R")
 
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "BLIS_NUM_THREADS")
+PATIENCE = 3  # times in a row that processes may die before any task is done
 
 _worker: dict[str, Any] = {}  # of a spawned process: the task and its context
 
@@ -36,20 +43,52 @@ def results(task: Callable[[C, K], R], context: C, keys: Iterable[K], workers: i
         for key in keys:
             yield task(context, key)
         return
+    missing, died = list(keys), 0
     with _environment(dict.fromkeys(BLAS_THREADS, "1")):
-        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start, initargs=(task, context))
-        try:
-            pending: set[Future[R]] = {pool.submit(_run, key) for key in keys}
-            while pending:
-                done, pending = wait(pending, return_when=FIRST_COMPLETED)
-                for future in done:
-                    yield future.result()
-        finally:  # also when the caller stops early or a task fails
-            pool.shutdown(cancel_futures=True)
+        while missing:
+            lost: list[K] = []
+            for result in _pooled(task, context, missing, workers, lost):
+                died = 0
+                yield result
+            died += 1
+            if lost and died == PATIENCE:
+                raise InputError(
+                    f"processes died {PATIENCE} times before any of {len(lost)} tasks was done (no memory left?); use fewer workers"
+                )
+            missing = lost
+
+
+def _pooled(task: Callable[[C, K], R], context: C, keys: list[K], workers: int, lost: list[K]) -> Iterator[R]:
+    """Results of one pool of processes; keys whose process died go to `lost`."""
+    pool = ProcessPoolExecutor(min(workers, len(keys)), mp_context=get_context("spawn"), initializer=_start, initargs=(task, context))
+    try:
+        futures: dict[Future[R], K] = {}
+        for key in keys:
+            try:
+                futures[pool.submit(_run, key)] = key
+            except BrokenProcessPool:
+                lost.append(key)
+        for future in as_completed(futures):
+            key = futures.pop(future)
+            if isinstance(future.exception(), BrokenProcessPool):
+                lost.append(key)
+            else:
+                yield future.result()
+    finally:  # also when the caller stops early or a task fails
+        pool.shutdown(cancel_futures=True)
 
 
 def _start(task: Callable[..., Any], context: Any) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asked
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _worker.update(task=task, context=context)
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _run(key: Any) -> Any:

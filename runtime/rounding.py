@@ -5,8 +5,8 @@
     uniform     x + U(-Delta, Delta)                                   variance Delta^2 / 3
     quantise    the grid point below or above x, step Delta, 1/2 each  variance Delta^2 / 3 about a smooth x
 
-The first three add to the measurement, the last one replaces it. Every draw has its own stream, a Philox generator keyed by (seed, level, run):
-its numbers do not depend on who draws, or when.
+The first three add Delta xi to the measurement, with xi the same for every Delta; the last one replaces it. Every draw has its own stream, a Philox
+generator keyed by (seed, level, run): its numbers do not depend on who draws, or when.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ import numpy as np
 Array = np.ndarray
 Mode = Literal["two-point", "uniform", "gaussian", "quantise"]
 
+ADDED = ("two-point", "gaussian", "uniform")
+"""Modes that add Delta xi."""
+
 
 def stream(seed: int, *key: int) -> np.random.Generator:
     """Random numbers of one draw: the same ones for the same seed and key, independent ones for others."""
@@ -25,21 +28,24 @@ def stream(seed: int, *key: int) -> np.random.Generator:
 
 
 def rounded(x: Array, step: float, mode: Mode, rng: np.random.Generator) -> Array:
-    """x as measured with steps of `step` (in the unit of x), same shape."""
-    if mode == "two-point":
-        return x + step * signs(x.shape, rng)
-    if mode == "gaussian":
-        return x + step * rng.standard_normal(x.shape)
-    if mode == "uniform":
-        return x + rng.uniform(-step, step, x.shape)
+    """x, shape (N, n), as measured with steps of `step` (in the unit of x)."""
+    if mode in ADDED:
+        return np.asarray(x + step * noise(x.shape, mode, rng))
     cell = x / step
     below = np.floor(cell)
     up = (signs(x.shape, rng) > 0) & (cell > below)  # a value on the grid stays there
-    return step * (below + up)
+    return np.asarray(step * (below + up))
+
+
+def noise(shape: tuple[int, ...], mode: Mode, rng: np.random.Generator) -> Array:
+    """xi of a mode that adds, shape (N, n)."""
+    if mode == "two-point":
+        return signs(shape, rng)
+    return rng.standard_normal(shape) if mode == "gaussian" else rng.uniform(-1.0, 1.0, shape)
 
 
 def signs(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """+1.0 or -1.0 with probability 1/2, one random bit each."""
+    """+1.0 or -1.0 with probability 1/2, one random bit each; columns are contiguous, as filters want them."""
     size = int(np.prod(shape))
-    bits = np.unpackbits(np.frombuffer(rng.bytes(-(-size // 8)), dtype=np.uint8), count=size)
-    return np.asarray(2.0 * bits - 1.0).reshape(shape)
+    bits = np.unpackbits(np.frombuffer(rng.bytes(-(-size // 8)), dtype=np.uint8), count=size).reshape(shape)
+    return np.asarray(2.0 * np.ascontiguousarray(bits.T) - 1.0).T

@@ -34,6 +34,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "array_api_compat": ("runtime/studies/device.py", "generated/"),
     "dask": ("runtime/studies/distributed.py",),
     "distributed": ("runtime/studies/distributed.py",),
+    "threadpoolctl": ("runtime/studies/distributed.py",),
     "scipy": ("runtime/",),
 }
 LAZY = {"runtime.io.records": {"runtime.io.datasets"}}  # pooch and its requests are loaded only for a dataset

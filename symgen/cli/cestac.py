@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,8 +13,11 @@ from symgen.cli.session import NEGATIVE, opened_model, origin, reported_errors, 
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
-    from runtime.cestac_result import Cestac, Run
+    from runtime.cestac_result import Cestac
+    from runtime.checkpoint import Checkpoint
     from runtime.study import Study
+
+INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 
 def cestac(
@@ -29,22 +34,41 @@ def cestac(
     columns: Annotated[str | None, typer.Option(help="essential, all, or names separated by commas.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random rounding.")] = None,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0: this one. The results do not depend on it.")] = 0,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler whose workers do the runs, such as tcp://10.0.0.1:8786.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print cestac.json instead of tables.")] = False,
 ) -> None:
-    """Study the encoder resolution. Exit code 1 where least squares is biased at one of the steps."""
+    """Study the encoder resolution. Exit code 1 where least squares is biased at one of the steps.
+
+    A long study with -o keeps its runs in DIR/runs as it goes: interrupted or killed, the same command goes on.
+    """
     single_thread()
     given = {"delta": delta, "torque": torque, "runs": runs, "rounding": rounding, "side": side, "seed": seed}
     given["columns"] = columns.split(",") if columns and "," in columns else _one_name(columns)
     with reported_errors(), opened_model(robot) as model:
         import runtime.cestac as study_of_resolution
+        from runtime.checkpoint import Checkpoint
 
         study, folder, records = study_and_records(record, model)
         study = changed(study, {key: value for key, value in given.items() if value is not None})
-        with progress_bar() as progress:
-            result = study_of_resolution.cestac(model, records, study, workers=workers, progress=progress, provenance=origin(records))
+        checkpoint = None if output is None else Checkpoint(output)
+        with progress_bar() as progress, kept_runs(checkpoint):
+            result = study_of_resolution.cestac(
+                model,
+                records,
+                study,
+                workers=workers,
+                scheduler=scheduler,
+                progress=progress,
+                checkpoint=checkpoint,
+                provenance=origin(records),
+            )
         if output is not None:
             title = f"{model.NAME}: encoder resolution on {', '.join(r.name for r in records)}"
             write_all(output, resolution_files(result, study_text(study, folder, output), title))
+        if checkpoint is not None and result.lists_runs:
+            checkpoint.remove()
         typer.echo(result.to_json() if json else console_text(result), nl=not json)
         if output is not None:
             typer.echo(f"report: {output / 'report.html'}", err=True)
@@ -60,10 +84,23 @@ def changed(study: Study, given: dict[str, Any]) -> Study:
     return study_from_mapping({**mapping, "cestac": {**mapping["cestac"], **given}})
 
 
-def progress_bar() -> Any:
-    """A bar on the error stream; the context gives what `cestac` calls after every run."""
-    from contextlib import contextmanager
+@contextmanager
+def kept_runs(checkpoint: Checkpoint | None) -> Iterator[None]:
+    """Ctrl-C says what is left of the study and ends with code 130."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        kept = (
+            f"{checkpoint.written} runs are in {checkpoint.folder}: the same command goes on"
+            if checkpoint and checkpoint.written
+            else "nothing is kept"
+        )
+        typer.echo(f"stopped; {kept}", err=True)
+        raise typer.Exit(INTERRUPTED) from None
 
+
+def progress_bar() -> Any:
+    """A bar on the error stream; the context gives what `cestac` calls as runs are done."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -73,7 +110,7 @@ def progress_bar() -> Any:
         with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
             task = progress.add_task("runs", total=None)
 
-            def advance(run: Run, done: int, total: int) -> None:
+            def advance(done: int, total: int) -> None:
                 progress.update(task, completed=done, total=total)
 
             yield advance

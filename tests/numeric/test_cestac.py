@@ -2,21 +2,25 @@
 
 import json
 from dataclasses import replace
+from hashlib import sha256
 
 import numpy as np
 import planar_2r_model as planar
 import pytest
-from planar_data import TRUE, record
+from planar_data import TRUE, motion, record
 from scipy.stats import t
 
-from runtime.cestac import cestac, levels_of, perturbed_position, perturbed_torque
-from runtime.cestac_result import Level, Run, deciding_names, level_result, runs_from_json, runs_needed
+from runtime.cestac import cestac, key_blocks, levels_of
+from runtime.cestac_result import Level, deciding_names, level_result, runs_needed
+from runtime.cestac_run import perturbed_position, perturbed_torque
 from runtime.drives import Drives
-from runtime.errors import InputError, SettingsError
+from runtime.errors import InputError, ModelError, SettingsError
 from runtime.estimators import estimate
-from runtime.observation import Observation, decimated_torque, observation_from_states, select_rows
+from runtime.model_text import ModelText
+from runtime.observation import Observation, decimated_torque, observation_from_states, observe, select_rows
+from runtime.runs import Run, Runs
 from runtime.signals import filtered_states
-from runtime.study import CestacSettings, Lowpass, Signals, Study
+from runtime.study import CestacSettings, EstimateSettings, Lowpass, Signals, Study
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20))
 RECORD = record()
@@ -70,8 +74,7 @@ def test_statistics_are_equations_18_to_22(small):
 def test_processes_give_the_same_bits(small):
     calls = []
     one, two = (
-        cestac(planar, RECORD, study(), workers=workers, progress=lambda run, done, total: calls.append((done, total)))
-        for workers in (1, 2)
+        cestac(planar, RECORD, study(), workers=workers, progress=lambda done, total: calls.append((done, total))) for workers in (1, 2)
     )
     assert one.to_json() == two.to_json()
     assert calls == [(done, 6) for done in range(1, 7)] * 2
@@ -79,14 +82,69 @@ def test_processes_give_the_same_bits(small):
         assert np.allclose(here.mean, there.mean, rtol=1e-12)
 
 
-def test_finished_runs_are_not_repeated(small):
-    done = runs_from_json(small.to_json())
-    new = []
-    longer = cestac(planar, RECORD, study(runs=4), finished=done, progress=lambda run, *_: new.append((run.level, run.run)))
-    assert new == [(0, 3), (1, 3)]
-    assert longer.levels[0].runs[:3] == small.levels[0].runs
-    with pytest.raises(InputError, match="another study"):
-        cestac(planar, RECORD, study(columns=("ZZ1R",)), finished=done)
+def test_common_random_numbers_are_filtered_once_for_all_steps():
+    """filter(q + Delta xi) = filter(q) + Delta filter(xi): the same run written out, on the side of the motors."""
+    common = study(common=True, side="motor", delta=(2e-2, 1e-2))
+    found = cestac(planar, RECORD, common)
+    drives = Drives.from_mapping(planar.DRIVES)
+    clean = filtered_states(RECORD.q, 1000.0, SIGNALS)
+    selection = select_rows(RECORD, clean.qd, SIGNALS, Study().rows)
+    for level in found.levels:
+        q = perturbed_position(RECORD.q, level.level, common.cestac, drives, (2,))
+        seen = observation_from_states(planar, filtered_states(q, 1000.0, SIGNALS), decimated_torque(RECORD.tau, selection), selection)
+        X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
+        assert np.allclose(level.runs[2].X, X, rtol=1e-8)
+
+
+def test_least_squares_by_normal_equations_while_the_condition_allows_it(small):
+    assert all(run.method == "normal equations" for level in small.levels for run in level.runs)
+    t = np.arange(6000) / 1000.0
+    slow = replace(RECORD, q=motion(t / 300)[0])  # accelerations 1e-5 of before
+    found = cestac(planar, slow, study(delta=(1e-9,)))
+    assert [run.method for run in found.levels[0].runs] == ["triangular factor"] * 3
+    assert np.allclose(found.levels[0].mean, found.reference.X, rtol=1e-3)
+
+
+def test_weights_take_the_way_of_the_identification():
+    weighted = replace(study(delta=(1e-3,)), estimate=EstimateSettings(method="wls"))
+    found = cestac(planar, RECORD, weighted)
+    q = perturbed_position(RECORD.q, Level(1e-3), weighted.cestac, None, (0, 1))
+    seen = observe(planar, replace(RECORD, q=q), weighted)
+    assert found.levels[0].runs[1].method == "triangular factor"
+    assert np.allclose(found.levels[0].runs[1].X, estimate(seen, weighted.estimate).X, rtol=1e-9)
+
+
+def test_tasks_have_fixed_borders():
+    """Whatever is missing, a run shares its task with the same others; with common numbers all levels of a run stay together."""
+    keys = [(level, run) for level in range(3) for run in range(100)]
+    blocks = key_blocks(keys, 100, 3, common=False)
+    assert max(map(len, blocks)) == 20 and sorted(key for block in blocks for key in block) == keys
+    assert {level for level, _ in blocks[0]} == {0}
+    without = key_blocks([key for key in keys if key[1] % 7], 100, 3, common=False)
+    assert all(any(set(part) <= set(block) for block in blocks) for part in without)
+    assert [len(block) for block in key_blocks(keys, 100, 3, common=True)] == [18] * 16 + [12]
+    assert key_blocks(keys, 100, 3, common=True)[0][:3] == ((0, 0), (1, 0), (2, 0))
+    assert len(key_blocks(keys[:5], 5, 1, common=False)) == 5
+
+
+def test_many_runs_are_not_listed_in_json(small):
+    many = replace(
+        small.levels[0].runs,
+        **{f: np.repeat(getattr(small.levels[0].runs, f), 400, axis=0) for f in ("run", "level", "X", "residual_norm", "normal")},
+    )
+    text = replace(small, levels=(replace(small.levels[0], runs=many), small.levels[1])).to_json()
+    assert json.loads(text)["levels"][0]["runs"] is None and json.loads(text)["levels"][0]["run_count"] == 1200
+    assert len(text) < len(small.to_json())
+
+
+def test_model_text_is_checked():
+    sent = ModelText.of(planar)
+    assert sent.load().BASE_PARAMETERS == planar.BASE_PARAMETERS
+    with pytest.raises(ModelError, match="not the one that was sent"):
+        replace(sent, text=sent.text + "\n").load()
+    harmful = sent.text + "\nimport os\n"
+    with pytest.raises(ModelError, match="import os"):
+        replace(sent, text=harmful, digest=sha256(harmful.encode()).hexdigest()).load()
 
 
 def test_bias_grows_as_the_square_of_the_step():
@@ -181,7 +239,7 @@ def test_verdicts():
         ((7.0, 6.0, 60.0), "biased", {"a", "b"}),
     ):
         X = reference.X * (1 - np.array(e) / 100)
-        result = level_result(Level(1e-3), [Run(0, k, tuple(X), 1.0) for k in range(3)], Measured, reference)
+        result = level_result(Level(1e-3), Runs.of([Run(0, k, tuple(X), 1.0) for k in range(3)], 3), Measured, reference)
         assert result.verdict == verdict
         assert set(result.decided_by) - {"rho"} == names
         assert "Not deciding" in result.message and "c" in result.message.rsplit(":", 1)[1]
