@@ -191,15 +191,15 @@ def stack(observations: Sequence[Observation]) -> Observation:
         settings=first.settings
         if all(o.settings == first.settings for o in observations)
         else {"records": [o.settings for o in observations]},
-        files=_all_files(observations),
+        files=all_files([o.files for o in observations]),
     )
 
 
-def _all_files(observations: Sequence[Observation]) -> dict[str, str]:
+def all_files(hashes: Sequence[Mapping[str, str]]) -> dict[str, str]:
     """Hashes by file name; a name that stands for another file in a later record gets the number of that record."""
     files: dict[str, str] = {}
-    for k, o in enumerate(observations, start=1):
-        for name, digest in o.files.items():
+    for k, of_record in enumerate(hashes, start=1):
+        for name, digest in of_record.items():
             files[name if files.get(name, digest) == digest else f"{name} ({k})"] = digest
     return files
 

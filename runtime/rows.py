@@ -53,7 +53,7 @@ def select_rows(record: Record, qd: Array, signals: Signals, rows: Rows, *, keep
     dropped = {}
     for reason, usable in (
         ("trim", _untrimmed(len(kept), rows.trim)),
-        ("low_speed", np.abs(qd[instants].T) >= _per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None]),
+        ("low_speed", np.abs(qd[instants].T) >= per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None]),
         ("mask", True if keep is None else _keep(keep, record)[instants].T),
     ):
         before = mask.sum(axis=1)
@@ -88,7 +88,8 @@ def _keep(keep: Array, record: Record) -> Array:
     return keep
 
 
-def _per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
+def per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
+    """A setting that is one number or one per joint, shape (n,)."""
     values = np.atleast_1d(np.asarray(value, dtype=float))
     if values.shape not in {(1,), (n,)}:
         raise InputError(f"{name} has {len(values)} values; expected one or {n}, one per joint")

@@ -23,6 +23,8 @@ from runtime.observation import Observation
 
 Window = tuple[float | None, float | None]
 
+PENDING = 4096  # rows of a joint gathered before they are triangularised
+
 
 @dataclass(frozen=True, eq=False)
 class Segment:
@@ -110,3 +112,68 @@ def merged(parts: Iterable[Sequence[JointFactor]]) -> tuple[JointFactor, ...]:
         JointFactor(same[0].columns, triangularise(np.vstack([joint.R for joint in same])), sum(joint.rows for joint in same))
         for same in zip(*parts, strict=True)
     )
+
+
+class SegmentFactors:
+    """The segments of one record, whose rows come in the order of time.
+
+    t0 : time of its first row, s.   length : of a block of residuals, s.   windows : where segments end, s.   columns : C_j by joint.
+    """
+
+    def __init__(self, record: int, t0: float, length: float, windows: Sequence[Window], columns: Sequence[Array]) -> None:
+        self.record, self.t0, self.length, self.windows, self.columns = record, t0, length, windows, columns
+        self.R: dict[tuple[int, tuple[bool, ...]], list[RowsFactor]] = {}
+
+    def take(self, t: Array, mask: Array, rows: Sequence[Array]) -> None:
+        """Rows [W_j[:, C_j] Y_j]' of every joint, shape (|C_j| + 1, rows of the joint), at the instants t where mask (n, k) is true."""
+        if not all(np.isfinite(x).all() for x in rows):
+            raise ValueError("W or Y holds values that are not finite; leave those samples out of the record")
+        block = np.floor((t - self.t0) / self.length + 1e-9).astype(int)
+        inside = np.array([(t >= _low(w)) & (t <= _high(w)) for w in self.windows], dtype=bool).reshape(len(self.windows), len(t))
+        changes = np.flatnonzero(np.diff(block) | (inside[:, 1:] != inside[:, :-1]).any(axis=0)) + 1
+        for a, b in zip([0, *changes], [*changes, len(t)], strict=True):
+            if a < b:
+                key = int(block[a]), tuple(inside[:, a].tolist())
+                segment = self.R.setdefault(key, [RowsFactor(len(C) + 1) for C in self.columns])
+                for j, joint in enumerate(segment):
+                    first = np.count_nonzero(mask[j, :a])
+                    joint.take(rows[j][:, first : first + np.count_nonzero(mask[j, a:b])])
+
+    def finish(self) -> list[Segment]:
+        """The segments, in time."""
+        return [
+            Segment(
+                self.record, block, inside, tuple(JointFactor(C, x.factor(), x.count) for C, x in zip(self.columns, joints, strict=True))
+            )
+            for (block, inside), joints in self.R.items()
+        ]
+
+
+class RowsFactor:
+    """R factor of rows that come by and by: R = R factor of [R; new rows]."""
+
+    def __init__(self, width: int) -> None:
+        self.parts: list[Array] = [np.zeros((0, width))]
+        self.pending = self.count = 0
+
+    def take(self, rows: Array) -> None:
+        """Rows, transposed: shape (width, B)."""
+        self.parts.append(rows.T)
+        self.count += rows.shape[1]
+        self.pending += rows.shape[1]
+        if self.pending >= PENDING:
+            self.factor()
+
+    def factor(self) -> Array:
+        """R of all rows so far."""
+        if self.pending:
+            self.parts, self.pending = [triangularise(np.vstack(self.parts))], 0
+        return self.parts[0]
+
+
+def _low(window: Window) -> float:
+    return -np.inf if window[0] is None else window[0]
+
+
+def _high(window: Window) -> float:
+    return np.inf if window[1] is None else window[1]

@@ -1,0 +1,92 @@
+"""Records that are read by blocks: what a source of samples offers, and samples that wait for one another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from runtime.record import Record
+
+Array = np.ndarray
+
+
+class Stream(Protocol):
+    """A record that is read by blocks, joint side, SI, as often as asked."""
+
+    name: str
+    n: int
+    rate: float
+    files: Mapping[str, str]
+
+    def __len__(self) -> int:
+        """Number of samples."""
+
+    def times(self) -> Iterator[Array]:
+        """Time of the samples, s, by blocks."""
+
+    def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
+        """t (B,), q (B, n), tau (B, n)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordStream:
+    """A Record in memory, read by blocks of `block` samples."""
+
+    record: Record
+    block: int
+
+    @property
+    def name(self) -> str:
+        """Name of the record."""
+        return self.record.name
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.record.n
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz."""
+        return self.record.rate
+
+    @property
+    def files(self) -> Mapping[str, str]:
+        """SHA-256 by file name."""
+        return self.record.files
+
+    def __len__(self) -> int:
+        return len(self.record)
+
+    def times(self) -> Iterator[Array]:
+        """Time of the samples, s, by blocks."""
+        return (self.record.t[a : a + self.block] for a in range(0, len(self), self.block))
+
+    def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
+        """t, q, tau by blocks."""
+        for a in range(0, len(self), self.block):
+            samples = slice(a, a + self.block)
+            yield self.record.t[samples], self.record.q[samples], self.record.tau[samples]
+
+
+class Queue:
+    """Samples in the order in which they came, along the first axis."""
+
+    def __init__(self) -> None:
+        self.parts: list[Array] = []
+        self.count = 0
+
+    def put(self, x: Array) -> None:
+        """The next samples."""
+        if len(x):
+            self.parts.append(x)
+            self.count += len(x)
+
+    def take(self, count: int) -> Array:
+        """The first `count` of those that wait."""
+        whole = np.concatenate(self.parts)
+        self.parts, self.count = [whole[count:]], self.count - count
+        return whole[:count]
