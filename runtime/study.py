@@ -18,6 +18,7 @@ from typing import Any, Literal
 
 from runtime.controller_settings import Controller
 from runtime.errors import SettingsError
+from runtime.excitation_settings import ExcitationSettings
 from runtime.mapping import plain, structure
 
 SCHEMA = 1
@@ -227,7 +228,8 @@ class CestacSettings:
 
 @dataclass(frozen=True)
 class Study:
-    """All settings. `record` holds one or several records of one robot; `controller`: the closed loop of simulation, IV, DIDIM and CLOE."""
+    """All settings. `record` holds one or several records of one robot; `controller`: the closed loop of simulation, IV,
+    DIDIM and CLOE; `excitation`: the search for a motion."""
 
     symgen: int = SCHEMA
     record: tuple[RecordSettings, ...] = ()
@@ -238,6 +240,7 @@ class Study:
     validate: ValidateSettings = field(default_factory=ValidateSettings)
     cestac: CestacSettings = field(default_factory=CestacSettings)
     controller: Controller | None = None
+    excitation: ExcitationSettings | None = None
 
     def __post_init__(self) -> None:
         _require(self.symgen == SCHEMA, ("symgen",), f"schema {self.symgen}; this version reads {SCHEMA}")

@@ -19,7 +19,8 @@ import casadi as ca
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.excitation import Array, ExcitationSettings, Limits, Weights, criterion_of, excesses, observed
+from runtime.excitation import Array, Limits, Weights, criterion_of, excesses, observed
+from runtime.excitation_settings import ExcitationSettings
 from runtime.model import GeneratedModel
 from runtime.processes import results
 from runtime.study import Study

@@ -79,6 +79,23 @@ def opened_model(robot: str) -> Iterator[GeneratedModel]:
         yield load_model(path)
 
 
+def symbolic_file(robot: str, model: GeneratedModel) -> Path:
+    """The CasADi module of `robot`, inside the block of `opened_model`: beside a generated module, else emitted beside `model`."""
+    from runtime.errors import ModelError
+
+    here = Path(str(getattr(model, "__file__", "")))
+    path = here.with_name(f"{here.stem}_casadi.py")
+    if Path(robot).suffix != ".py" and not path.exists():
+        from symgen.description import load_robot
+        from symgen.emit import generate_files
+
+        files = generate_files(load_robot(robot), targets=("casadi",))
+        if path.name not in files:
+            raise ModelError(f"{model.NAME} has joints that only its closure equations tie; there is no CasADi model of it")
+        path.write_text(files[path.name], encoding="utf-8")
+    return path
+
+
 def study_and_records(record: str, model: GeneratedModel) -> tuple[Study, Path, list[Record]]:
     """The study a RECORD argument means, the folder of its files, and its records."""
     from runtime.errors import InputError
