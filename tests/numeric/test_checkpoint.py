@@ -1,0 +1,225 @@
+"""Long studies: killed, interrupted, on a full disk, and resumed with the bits of an uninterrupted one."""
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import planar_2r_model as planar
+import pytest
+from planar_data import record
+
+from runtime.cestac import cestac
+from runtime.checkpoint import Checkpoint
+from runtime.errors import InputError
+from runtime.runs import Run, Runs
+from runtime.study import CestacSettings, Lowpass, Signals, Study
+
+RECORD = record(N=3000)
+HERE = Path(__file__).parent
+
+
+def study(**settings):
+    settings = {"delta": (1e-3, 2e-3), "runs": 10, "columns": "all", **settings}
+    return Study(signals=Signals(median=1, lowpass=Lowpass(cutoff=20)), cestac=CestacSettings(**settings))
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return cestac(planar, RECORD, study())
+
+
+def same_bits(found, expected):
+    return all(
+        np.array_equal(getattr(a.runs, name), getattr(b.runs, name))
+        for a, b in zip(found.levels, expected.levels, strict=True)
+        for name in ("run", "X", "residual_norm", "normal")
+    )
+
+
+def stopping_after(count, kind=KeyboardInterrupt):
+    def progress(done, total):
+        if done >= count:
+            raise kind
+
+    return progress
+
+
+def files(folder):
+    return sorted(p.name for p in (folder / "runs").iterdir()) if (folder / "runs").exists() else []
+
+
+def test_interrupted_and_resumed(tmp_path, whole):
+    first = Checkpoint(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        cestac(planar, RECORD, study(), checkpoint=first, progress=stopping_after(7))
+    assert files(tmp_path) == ["000000.npz", "study.json"] and first.written >= 7
+    seen = []
+    second = cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path), progress=lambda done, total: seen.append(done))
+    assert seen[0] == first.written + 2 and seen[-1] == 20  # tasks of two runs
+    assert same_bits(second, whole) and second.to_json() == whole.to_json()
+    cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path), progress=lambda *_: pytest.fail("nothing is left to do"))
+
+
+def test_longer_study_repeats_nothing(tmp_path, whole):
+    cestac(planar, RECORD, study(runs=6), checkpoint=Checkpoint(tmp_path))
+    seen = []
+    found = cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path), progress=lambda done, total: seen.append(done))
+    assert same_bits(found, whole) and min(seen) > 12
+    shorter = cestac(planar, RECORD, study(runs=4), checkpoint=Checkpoint(tmp_path))
+    assert np.array_equal(shorter.levels[1].runs.X, whole.levels[1].runs.X[:4])
+
+
+SCRIPT = """
+import os, resource, sys, time
+for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ[name] = "1"
+sys.path.insert(0, sys.argv[1])
+from pathlib import Path
+from test_checkpoint import RECORD, Checkpoint, cestac, planar, study
+if sys.argv[3] != "0":
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
+print("ready", flush=True)
+slowly = (lambda done, total: time.sleep(0.05)) if sys.argv[3] == "0" else None
+cestac(planar, RECORD, study(), checkpoint=Checkpoint(Path(sys.argv[2]), every=0.0), progress=slowly)
+"""
+
+
+def started(folder, limit=0):
+    arguments = [sys.executable, "-c", SCRIPT, str(HERE), str(folder), str(limit)]
+    return subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def test_killed_and_resumed(tmp_path, whole):
+    process = started(tmp_path)
+    limit = time.monotonic() + 60
+    while len(files(tmp_path)) < 4 and process.poll() is None and time.monotonic() < limit:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
+    (tmp_path / "runs" / "000099.npz.unfinished").write_bytes(b"PK half of an archi")  # as a kill in the middle of writing leaves it
+    checkpoint = Checkpoint(tmp_path)
+    found = cestac(planar, RECORD, study(), checkpoint=checkpoint)
+    assert same_bits(found, whole)
+    assert not [name for name in files(tmp_path) if "unfinished" in name]
+
+
+def test_full_disk(tmp_path, whole):
+    """A limit on the size of files, below that of study.json."""
+    process = started(tmp_path, limit=1000)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "InputError" in errors and "File too large; 0 runs are safe" in errors
+    assert files(tmp_path) == []
+    assert same_bits(cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path)), whole)
+
+
+def test_disk_that_fills_up_leaves_earlier_archives(tmp_path, whole, monkeypatch):
+    first = Checkpoint(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        cestac(planar, RECORD, study(), checkpoint=first, progress=stopping_after(8))
+
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    before = (tmp_path / "runs" / "000000.npz").read_bytes()
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InputError, match=f"No space left on device; {first.written} runs are safe"):
+        cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path))
+    monkeypatch.undo()
+    assert files(tmp_path) == ["000000.npz", "study.json"] and (tmp_path / "runs" / "000000.npz").read_bytes() == before
+    assert same_bits(cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path)), whole)
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        (lambda r, s: (r, study(seed=2)), "cestac.seed"),
+        (lambda r, s: (r, study(delta=(1e-3,))), "cestac.delta"),
+        (lambda r, s: (replace(r, tau=r.tau + 1e-12), s), "records"),
+        (lambda r, s: (r, replace(s, signals=replace(s.signals, lowpass=Lowpass(cutoff=21)))), "factor, signals"),
+    ],
+)
+def test_another_study_is_refused(tmp_path, change, names):
+    cestac(planar, RECORD, study(runs=2), checkpoint=Checkpoint(tmp_path))
+    changed = change(RECORD, study(runs=2))
+    with pytest.raises(InputError, match=f"another study, {names} differ; use another folder"):
+        cestac(planar, *changed, checkpoint=Checkpoint(tmp_path))
+
+
+def some_runs(first, count, b=3):
+    return Runs.of([Run(0, k, tuple(float(k + i) for i in range(b)), 1.0) for k in range(first, first + count)], b)
+
+
+def test_archives_are_numbered_and_written_when_it_is_time(tmp_path):
+    now = [0.0]
+    checkpoint = Checkpoint(tmp_path, every=10, clock=lambda: now[0])
+    assert len(checkpoint.resume({"a": 1}, 3)) == 0
+    checkpoint.add(some_runs(0, 5))
+    assert files(tmp_path) == []
+    now[0] = 11.0
+    checkpoint.add(some_runs(5, 5))
+    assert files(tmp_path) == ["000000.npz", "study.json"]
+    checkpoint.add(some_runs(10, 1))
+    checkpoint.flush()
+    checkpoint.flush()
+    assert files(tmp_path) == ["000000.npz", "000001.npz", "study.json"]
+    found = Checkpoint(tmp_path).resume({"a": 1}, 3)
+    assert found.run.tolist() == list(range(11)) and found[10] == Run(0, 10, (10.0, 11.0, 12.0), 1.0)
+    checkpoint.remove()
+    assert not (tmp_path / "runs").exists()
+
+
+def test_archives_are_compact(tmp_path):
+    """100,000 runs of 60 parameters must fit: no more than their numbers and 10 %."""
+    b, R = 60, 20_000
+    rng = np.random.default_rng(0)
+    runs = Runs(np.zeros(R, dtype=np.int64), np.arange(R), rng.standard_normal((R, b)), np.ones(R), np.ones(R, dtype=bool))
+    checkpoint = Checkpoint(tmp_path)
+    checkpoint.resume({}, b)
+    checkpoint.add(runs)
+    assert (tmp_path / "runs" / "000000.npz").stat().st_size < 1.1 * 8 * R * b
+
+
+def damaged(path):
+    path.write_bytes(path.read_bytes()[:300])
+
+
+def pickled(path):
+    np.savez(path, X=np.array([{"a": 1}], dtype=object), **dict.fromkeys(("level", "run", "residual_norm", "normal"), np.zeros(1)))
+
+
+def other_shape(path):
+    np.savez(path, X=np.zeros((2, 4)), level=np.zeros(2, int), run=np.zeros(2, int), residual_norm=np.zeros(2), normal=np.zeros(2, bool))
+
+
+@pytest.mark.parametrize("spoil", [damaged, pickled, other_shape])
+def test_bad_archives(tmp_path, spoil):
+    checkpoint = Checkpoint(tmp_path)
+    checkpoint.resume({}, 3)
+    checkpoint.add(some_runs(0, 5))
+    checkpoint.flush()
+    spoil(tmp_path / "runs" / "000000.npz")
+    with pytest.raises(InputError, match=r"000000\.npz: .*delete this file"):
+        Checkpoint(tmp_path).resume({}, 3)
+
+
+@pytest.mark.parametrize("text", ["{", "[1]", "\0"])
+def test_bad_study_file(tmp_path, text):
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "study.json").write_text(text)
+    with pytest.raises(InputError, match=r"study\.json.*to start again"):
+        Checkpoint(tmp_path).resume({}, 3)
+
+
+def test_study_file_says_what_was_studied(tmp_path):
+    cestac(planar, RECORD, study(runs=2), checkpoint=Checkpoint(tmp_path))
+    found = json.loads((tmp_path / "runs" / "study.json").read_text())
+    assert found["cestac.seed"] == 1 and found["robot"] == "planar_2r_test" and "cestac.runs" not in found
