@@ -1,0 +1,146 @@
+"""From the columns of a file to positions and torques of the joint side, SI: names, finite numbers, scale, units, then the drives.
+
+Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from runtime.drives import Drives
+from runtime.errors import InputError
+from runtime.io.table import Table
+from runtime.study import Columns, RecordSettings
+
+Array = np.ndarray
+
+POSITION = {
+    "rad": 1.0,
+    "deg": np.pi / 180,
+    "rev": 2 * np.pi,
+    "counts": 2 * np.pi,
+    "m": 1.0,
+    "mm": 1e-3,
+}  # to rad or m; counts per revolution apart
+COMMANDS = ("A", "V")  # units that a torque constant turns into torque
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """Factors of the n columns of positions (to rad or m) and of commands, and the drives behind which they were measured; None: joint side."""
+
+    positions: Array
+    commands: Array
+    drives: Drives | None
+
+    def position(self, q: Array) -> Array:
+        """Joint positions, rad or m; q, shape (N, n), as in the file."""
+        q = q * self.positions
+        return q if self.drives is None else self.drives.joint_position(q)
+
+    def torque(self, tau: Array) -> Array:
+        """Joint torques, N m or N; tau, shape (N, n), as in the file."""
+        tau = tau * self.commands
+        return tau if self.drives is None else self.drives.joint_torque(tau)
+
+
+def conversion(settings: RecordSettings, drives: Drives | None, first: Table, last: Table, n: int) -> Conversion:
+    """How the columns of a record become joint side, SI; first, last : tables of the positions and of the torques."""
+    positions = _scale(settings.scale.q, first, n, "scale.q") * _position_units(settings, n)
+    scale, constant = _scale(settings.scale.tau, last, n, "scale.tau"), _torque_constant(settings, drives, n)
+    if settings.side == "joint":
+        return Conversion(positions, scale * constant, None)
+    if drives is None:
+        raise InputError(
+            "side is motor but the robot has no drives; give them in the robot file, or a record of the joint side", file=first.file
+        )
+    return Conversion(positions, scale, replace(drives, torque_constant=constant, coupling=settings.coupling))
+
+
+def column_names(settings: RecordSettings, first: Table, last: Table) -> Columns:
+    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out."""
+    given = settings.columns
+    t = given.t if given.t is not None or settings.rate is not None or "t" not in first.names else "t"
+    qr = given.qr or (_numbered("qr", first) if "qr1" in first.names else ())
+    return Columns(t, given.q or _numbered("q", first), given.tau or _numbered("tau", last), qr)
+
+
+def reference_columns(table: Table, names: Sequence[str], n: int) -> Array | None:
+    """Reference positions as the file holds them, where it does."""
+    if not names:
+        return None
+    q_r = finite_columns(table, names)
+    if q_r.shape[1] != n:
+        raise InputError(f"{q_r.shape[1]} reference positions {', '.join(names)}; expected {n}", file=table.file)
+    return q_r
+
+
+def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
+    found = sorted((int(m[1]), name) for name in table.names if (m := re.fullmatch(rf"{quantity}(\d+)", name)))
+    if not found:
+        raise InputError(
+            f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name them in record.columns.{quantity}",
+            file=table.file,
+        )
+    return tuple(name for _, name in found)
+
+
+def finite_columns(table: Table, names: Sequence[str]) -> Array:
+    """The columns, shape (N, k), without nan or infinity."""
+    x = table.stack(names)
+    bad = np.argwhere(~np.isfinite(x))
+    if len(bad):
+        i, j = bad[0]
+        column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
+        raise InputError(
+            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut the record",
+            file=table.file,
+            column=column,
+            row=table.row(i),
+        )
+    return x
+
+
+def _per_joint(value: float | Sequence[float], n: int, key: str, table: Table | None = None) -> Array:
+    x = np.atleast_1d(np.asarray(value, dtype=float))
+    if len(x) not in (1, n):
+        raise InputError(
+            f"record.{key} has {len(x)} values; expected one or {n}, one per joint", file=None if table is None else table.file
+        )
+    return np.broadcast_to(x, (n,))
+
+
+def _scale(scale: float | tuple[float, ...] | str, table: Table, n: int, key: str) -> Array:
+    return _per_joint(table.scalar(scale) if isinstance(scale, str) else scale, n, key, table)
+
+
+def _each(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
+    each = units if isinstance(units, tuple) else (units,) * n
+    if len(each) != n:
+        raise InputError(f"record.{key} has {len(each)} units; expected one or {n}, one per joint")
+    return each
+
+
+def _position_units(settings: RecordSettings, n: int) -> Array:
+    """Factors to rad or m, shape (n,)."""
+    units = _each(settings.units.q, n, "units.q")
+    counts = _per_joint(1.0 if settings.counts_per_revolution is None else settings.counts_per_revolution, n, "counts_per_revolution")
+    return np.array([POSITION[unit] / (counts[j] if unit == "counts" else 1.0) for j, unit in enumerate(units)])
+
+
+def _torque_constant(settings: RecordSettings, drives: Drives | None, n: int) -> Array:
+    """Factors from the unit of tau to N m or N, shape (n,): a torque constant for A and V, 1 for a torque."""
+    units = _each(settings.units.tau, n, "units.tau")
+    if not any(unit in COMMANDS for unit in units):
+        return np.ones(n)
+    if settings.torque_constant is not None:
+        constant = _per_joint(settings.torque_constant, n, "torque_constant")
+    elif drives is not None and settings.side == "motor":
+        constant = drives.torque_constant
+    else:
+        raise InputError(f"tau is in {', '.join(units)} but there is no torque constant; set record.torque_constant")
+    return np.array([constant[j] if unit in COMMANDS else 1.0 for j, unit in enumerate(units)])
