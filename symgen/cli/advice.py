@@ -1,0 +1,72 @@
+"""`symgen cestac --advise`: the coarsest encoders that keep the change of the estimate below 1 % and below 5 %."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from symgen.cli.session import origin, study_text
+from symgen.cli.writing import write_all
+
+if TYPE_CHECKING:
+    from runtime.advice import Advice
+    from runtime.model import GeneratedModel
+    from runtime.record import Record
+    from runtime.study import Study
+
+
+def advised(
+    model: GeneratedModel,
+    study: Study,
+    folder: Path,
+    records: Sequence[Record],
+    asked: Sequence[float],
+    output: Path | None,
+    json: bool,
+) -> bool:
+    """Print and write the advice; True where least squares would be biased at one of the steps asked for, or the runs contradict the prediction."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from runtime.cestac_result import BIASED
+    from runtime.resolution import advise
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("encoders", total=None)
+        advice = advise(
+            model,
+            records,
+            study,
+            asked=asked,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+            provenance=origin(records),
+        )
+    if output is not None:
+        title = f"{model.NAME}: encoder resolution advised on {', '.join(r.name for r in records)}"
+        write_all(output, advice_files(advice, study_text(study, folder, output), title))
+    typer.echo(advice.to_json() if json else f"{advice.to_table()}\n\n{advice.verdict}", nl=not json)
+    if output is not None:
+        typer.echo(f"report: {output / 'report.html'}", err=True)
+    doubted = any(not limit.agrees for encoder in advice.encoders for limit in encoder.limits)
+    return doubted or any(advice.worst(k)[1] > BIASED for k in range(len(asked)))
+
+
+def advice_files(advice: Advice, study: str, title: str) -> dict[str, str | bytes]:
+    """Contents of the output folder, by file name."""
+    from runtime.report import plots
+    from runtime.report.advice import advice_figure, advice_section
+    from runtime.report.html import Page, Section, render
+
+    settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
+    page = Page(title=title, verdict=advice.verdict, sections=[advice_section(advice), settings])
+    figure = advice_figure(advice)
+    return {
+        "report.html": render(page),
+        "advice.json": advice.to_json(),
+        "study.yaml": study,
+        "advice.png": plots.png(figure),
+        "advice.svg": plots.svg(figure),
+    }

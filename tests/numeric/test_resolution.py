@@ -1,0 +1,229 @@
+"""Resolution advisor: moments of filtered noise, friction that switches, predicted against sampled steps on EMPS and TX40."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from runtime.advice import AGREED, crossing, sampled
+from runtime.bandwidth import bandwidth
+from runtime.errors import InputError, ModelError, SettingsError
+from runtime.io.datasets import dataset_study
+from runtime.io.records import read_records
+from runtime.model import load_model
+from runtime.observation import decimated_torque, observe
+from runtime.perturbation import encoder_root, perturbation
+from runtime.report.advice import advice_section
+from runtime.resolution import ALL, Predictor, advise, torque_sigma
+from runtime.signals import decimated, filtered_states
+from runtime.study import Decimate, Lowpass, Signals, study_from_mapping
+from runtime.switching import Switch, kernels, switched, switches
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+TX40_COLUMNS = (
+    "ZZ1R",
+    "FV1",
+    "FS1",
+    "XX2R",
+    "XZ2R",
+    "ZZ2R",
+    "MX2R",
+    "FV2",
+    "FS2",
+    "ZZ3R",
+    "MY3R",
+    "Ia3",
+    "FV3",
+    "FS3",
+    "Ia4",
+    "FV4",
+    "FS4",
+)
+TX40_COLUMNS += ("MY5R", "Ia5", "FV5", "FS5", "FV6", "FVM6", "FSM6")
+
+
+def opened(name):
+    study = study_from_mapping(dataset_study(name))
+    model = load_model(GENERATED / f"{name}.py")
+    return model, study, read_records(study.record, model)[0]
+
+
+@pytest.fixture(scope="module")
+def emps(emps_data):
+    return opened("emps")
+
+
+@pytest.fixture(scope="module")
+def emps_advice(emps):
+    model, study, record = emps
+    return advise(model, record, replace(study, cestac=replace(study.cestac, runs=40)), asked=(1e-6, 1e-4))
+
+
+@pytest.mark.parametrize(
+    ("signals", "rate"),
+    [
+        (Signals(median=1, lowpass=Lowpass(cutoff=50)), 5000.0),
+        (Signals(median=1, lowpass=Lowpass(cutoff=100, on=("q",)), decimate=Decimate(factor=10, phase="last", padding="matlab")), 1000.0),
+        (Signals(median=1, lowpass=None, decimate=None), 1000.0),
+    ],
+)
+def test_moments_are_those_of_the_filters_as_they_run(signals, rate):
+    """One unit error far from the ends: the sum of squares of what it becomes is the variance of what unit white noise becomes."""
+    N = 12001
+    impulse = np.zeros((N, 1))
+    impulse[N // 2] = 1.0
+    states = filtered_states(impulse, rate, signals)
+    x = np.stack([states.q[:, 0], states.qd[:, 0], states.qdd[:, 0]])
+    band = bandwidth(signals, rate)
+    assert np.allclose(band.before, x @ x.T, rtol=1e-6, atol=1e-9 * np.sqrt(np.outer(np.diag(x @ x.T), np.diag(x @ x.T))))
+    factor = 1 if signals.decimate is None else (40 if rate == 5000 else 10)
+    phases = [decimated(np.roll(x, k, axis=1), factor, signals.decimate) for k in range(factor)]  # every phase of the kept samples
+    after = sum(y @ y.T for y in phases)
+    assert np.allclose(band.after, after, rtol=1e-5, atol=1e-6 * np.sqrt(np.outer(np.diag(after), np.diag(after))))
+    lag = 7
+    assert np.isclose(band.speed[lag], x[1, lag:] @ x[1, :-lag] / (x[1] @ x[1]), atol=1e-6)
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_a_switch_under_noise_against_sampling(half):
+    """sign(s) and max(s, 0) of a speed that rests, creeps and passes zero, 400 draws of filtered noise."""
+    signals, rate, N = Signals(median=1, lowpass=Lowpass(cutoff=50)), 2000.0, 16000
+    factor = 16
+    band = bandwidth(signals, rate)
+    t = np.arange(N) / rate
+    s = np.where(t < 2, 0.002 * np.sin(40 * t), np.sin(2 * np.pi * 0.7 * (t - 2)) * np.where(t < 5, 0.02, 1.0))
+    delta = 2e-4
+    sigma = delta * np.sqrt(band.before[1, 1])
+    switch = Switch(0, np.ones(1), 0.5, 0.0, 0.5) if half else Switch(0, np.ones(1), 0.0, 1.0, 0.0)
+    found = switched(switch, s[:, None], sigma, band.gain, kernels(band, N, factor), factor, signals.decimate, np.ones((1, N), dtype=bool))
+
+    def f(v):
+        return np.maximum(v, 0) if half else np.sign(v)
+
+    rng = np.random.default_rng(3)
+    clean = decimated(f(s)[None], factor, signals.decimate)[0]
+    draws, noises = [], []
+    for _ in range(400):
+        x = filtered_states(delta * rng.standard_normal((N, 1)), rate, signals).qd[:, 0]
+        y = decimated(np.array([f(s + x), x]), factor, signals.decimate)
+        draws.append(y[0])
+        noises.append(y[1])
+    draws, noises = np.array(draws), np.array(noises)
+    inner = slice(30, -30)
+    shift, variance = draws.mean(axis=0) - clean, draws.var(axis=0)
+    scale = np.linalg.norm(shift[inner])
+    assert np.linalg.norm((found.shift - shift)[inner]) < 0.1 * scale + 1.2 * np.sqrt(variance[inner].sum() / 400)
+    assert np.isclose(found.variance[0], variance.sum(), rtol=0.08)
+    covariance = np.mean((draws - draws.mean(axis=0)) * noises, axis=0).sum()
+    assert np.isclose((found.slope * delta**2 * band.after[1, 1]).sum(), covariance, rtol=0.06)
+
+
+def test_switches_come_from_the_elements_of_the_model():
+    tx40, both = load_model(GENERATED / "tx40.py"), load_model(GENERATED / "emps_asymmetric.py")
+    found = {s.column: s for s in switches(tx40, TX40_COLUMNS)}
+    coupled = found[TX40_COLUMNS.index("FSM6")]
+    assert coupled.joints == (4, 5) and tuple(coupled.G) == (0, 0, 0, 0, 1, 1) and coupled.jump == 1
+    assert [TX40_COLUMNS[k] for k in found] == ["FS1", "FS2", "FS3", "FS4", "FS5", "FSM6"]
+    s = np.array([-2.0, 3.0])
+    for switch in switches(both, both.BASE_PARAMETERS):  # values of the emitted columns, up to a constant
+        D = both.regressor(np.zeros((2, 1)), s[:, None], np.zeros((2, 1)))[:, 0, switch.column]
+        f = switch.linear * s + switch.jump * np.sign(s) + switch.kink * np.abs(s)
+        assert np.isclose(np.ptp(D), np.ptp(f)) and np.isclose(D[1] - D[0], f[1] - f[0])
+
+
+def test_emps_steps_predicted_and_sampled(emps_advice):
+    """15 % in Delta, as asked of the advisor: 30 % in %e, which grows with its square."""
+    first = emps_advice.encoders[0]
+    assert [limit.parameter for limit in first.limits] == ["M1R", "M1R"]
+    for limit in first.limits:
+        assert limit.half_width < 0.1 * limit.percent
+        assert abs(limit.error / limit.percent - 1) < 0.1
+    for point in first.sampled:
+        at = np.array([np.interp(np.log(point.delta), np.log(first.delta), change) for change in first.change.T])
+        assert np.all(np.abs(point.change - at) < point.half_width + AGREED * np.abs(at))
+
+
+def test_advice_in_words_and_json(emps_advice):
+    assert (
+        "up to Delta = 4.6e-06 m (M1R first; 40 runs there gave" in emps_advice.verdict
+        or "4.59e-06 m (M1R first; 40 runs" in emps_advice.verdict
+    )
+    assert emps_advice.worst(0)[1] < 1 < 50 < emps_advice.worst(1)[1] and emps_advice.worst(1)[0] == "M1R"
+    data = json.loads(emps_advice.to_json())
+    assert data["deciding"] == ["M1R", "FV1", "FS1", "OFFSET1"] and len(data["encoders"]) == 1
+    assert data["encoders"][0]["limits"][0]["percent"] == 1.0
+    words = " ".join(emps_advice.assumptions)
+    assert all(word in words for word in ("two-point", "joint side", "1000 Hz", "100 Hz", "decimation by 10", "FS1"))
+    assert "M1R" in emps_advice.to_table()
+    section = advice_section(emps_advice)
+    assert section.images[0].svg.startswith(b"<?xml") and [len(table.rows) for table in section.tables] == [1, 4]
+
+
+def test_uniform_rounding_allows_root_three_more(emps, emps_advice):
+    model, study, record = emps
+    uniform = advise(model, record, replace(study, cestac=replace(study.cestac, rounding="uniform")), confirm=False)
+    ratio = uniform.encoders[0].limits[1].delta / emps_advice.encoders[0].limits[1].delta
+    assert np.isclose(ratio, np.sqrt(3), rtol=1e-3)
+
+
+def test_torque_noise_adds_to_sigma_and_does_not_bias(emps, emps_advice):
+    model, study, record = emps
+    W = observe(model, record, study)
+    part = perturbation(model, record, study, W.names)
+    found = torque_sigma(Predictor((part,), np.ones(1), 1.0), None)
+    assert np.allclose(found, emps_advice.torque_sigma)
+    rng = np.random.default_rng(0)
+    noise = [
+        decimated_torque(rng.standard_normal((len(record), 1)), part.selection).ravel()[part.selection.mask.ravel()] for _ in range(300)
+    ]
+    X = np.linalg.lstsq(W.W, np.array(noise).T, rcond=None)[0]
+    assert np.allclose(X.std(axis=1), found, rtol=0.15)
+    assert np.all(np.abs(X.mean(axis=1)) < 4 * found / np.sqrt(300))
+
+
+def test_tx40_steps_predicted_and_sampled(tx40_data):
+    """All encoders and two single ones; every parameter that matters, not only the first."""
+    model, study, record = opened("tx40")
+    advice = advise(model, record, replace(study, cestac=replace(study.cestac, runs=6)), columns=TX40_COLUMNS, encoders=(ALL, "2", "6"))
+    assert [encoder.label for encoder in advice.encoders] == [ALL, "2", "6"]
+    assert all(limit.agrees for encoder in advice.encoders for limit in encoder.limits)
+    first = advice.encoders[0]
+    decisive = [advice.names.index(name) for name in advice.deciding]
+    for point in first.sampled[1:]:
+        at = np.array([np.interp(np.log(point.delta), np.log(first.delta), change) for change in first.change.T])
+        off = np.abs(point.change - at) / (1.6 * point.half_width + AGREED * np.abs(at))  # 120 comparisons with 95 % intervals
+        assert np.all(off[decisive] < 1)
+
+
+def test_motor_side_goes_through_the_drives(tx40_data):
+    model, study, record = opened("tx40")
+    motor = replace(study, cestac=replace(study.cestac, side="motor"))
+    part = perturbation(model, record, motor, ("ZZ1R", "Ia5", "FSM6"))
+    R = np.array(model.DRIVES["ratio"])
+    assert np.allclose(part.root @ R, np.eye(6), atol=1e-12)
+    joint = perturbation(model, record, study, ("ZZ1R", "Ia5", "FSM6"))
+    assert np.allclose(part.smooth[0].G, joint.smooth[0].G / R[0, 0] ** 2, rtol=1e-5, atol=1e-9)
+
+
+def test_what_no_prediction_goes_through_is_refused(emps):
+    model, study, record = emps
+    with pytest.raises(SettingsError, match="not linear"):
+        advise(model, record, replace(study, cestac=replace(study.cestac, median=5)))
+    with pytest.raises(SettingsError, match="covariance"):
+        advise(model, record, replace(study, estimate=replace(study.estimate, method="wls", weights="covariance")))
+    with pytest.raises(SettingsError, match="no drives"):
+        encoder_root(load_model(GENERATED / "planar_2r.py"), replace(study, cestac=replace(study.cestac, side="motor")))
+    with pytest.raises(InputError, match="no encoder 7"):
+        advise(model, record, study, encoders=("7",))
+    with pytest.raises(ModelError, match="ELEMENTS"):
+        switches(__import__("planar_2r_model"), ("FS1",))
+
+
+def test_where_a_curve_crosses():
+    delta = np.array([1.0, 2.0, 4.0, 8.0])
+    assert np.isclose(crossing(delta, 0.3 * delta**2, 1.0), np.sqrt(1 / 0.3))
+    assert np.isnan(crossing(delta, 0.001 * delta, 1.0)) and np.isnan(crossing(delta, 2 * delta, 1.0))
+    found = sampled(1.0, np.array([[1.0], [3.0]]), np.array([4.0]))
+    assert np.isclose(found.change[0], -50) and np.isclose(found.half_width[0], 100 * 12.706204736 * np.sqrt(2) / np.sqrt(2) / 4)
