@@ -86,12 +86,12 @@ def feasible(
     free = system.solve()
     judged = feasibility(physical, system.names, free.X, options)
     if judged.feasible and judged.margin >= options.margin and options.prior == "none":
-        chi, weight = judged.chi, 0.0
-        X = free.X
+        X, chi, weight = free.X, judged.chi, 0.0
     else:
         chi, weight = weighed(system.weighted, physical, options)
         X = physical.rows(system.names) @ chi
-    chi = nearest_standard(physical, system.names, X, chi, options)
+    if weight == 0:  # nothing was pulled: chi is one of many
+        chi = nearest_standard(physical, system.names, X, chi, options)
     found = replace(free, X=X, residual_norm=residual_norm(system.weighted, X))
     estimate = assemble(replace(system, settings=settings), found, model=model, provenance=provenance)
     smallest = physical.smallest(chi)

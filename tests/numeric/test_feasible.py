@@ -1,0 +1,291 @@
+"""Feasible least squares against point masses, pinocchio, a hand-written parametrisation of all physical robots, and the TX40 record."""
+
+from __future__ import annotations
+
+import builtins
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from oracles.pinocchio_model import PinocchioModel
+from runtime import InputError, SettingsError, observe, read_records, study_from_mapping
+from runtime.estimate import Estimate
+from runtime.estimators import estimate
+from runtime.estimators.feasible import Options, linear, residual_norm, weighed
+from runtime.feasibility import Ellipsoid, Limits, feasibility, limit_rows, standard_parameters
+from runtime.io.datasets import dataset_study
+from runtime.model import load_model
+from runtime.observation import Observation
+from runtime.physical import INERTIAL, physical_model, pseudo_inertia
+from runtime.study import EstimateSettings
+from symgen.description import load_robot
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+FEASIBLE = EstimateSettings("feasible", options={"bootstrap": 0})
+
+
+def emitted(name: str):
+    return load_model(GENERATED / f"{name}.py")
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return emitted("planar_2r")
+
+
+@pytest.fixture(scope="module")
+def tx40():
+    return emitted("tx40")
+
+
+def ten_of(mass: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """The ten parameters of point masses (k,) at places (k, 3), by definition."""
+    J = sum(m * (x @ x * np.eye(3) - np.outer(x, x)) for m, x in zip(mass, place, strict=True))
+    return np.array([J[0, 0], J[0, 1], J[0, 2], J[1, 1], J[1, 2], J[2, 2], *(mass @ place), mass.sum()])
+
+
+def simulated(model, X: np.ndarray, noise: float, seed: int = 0, N: int = 300) -> Observation:
+    """Random states of a motion without rest, torques with white noise."""
+    rng = np.random.default_rng(seed)
+    n = len(model.JOINTS)
+    q, qd, qdd = rng.uniform(-3, 3, (3, N, n))
+    W = np.asfortranarray(model.observation_matrix(q, qd, qdd))
+    Y = W @ X + noise * rng.standard_normal(n * N)
+    return Observation(W, Y, (N,) * n, model.BASE_PARAMETERS, np.tile(np.arange(N) / 100, n), np.zeros(n * N, dtype=int), 100.0)
+
+
+def values(model) -> np.ndarray:
+    return np.array([model.VALUES[name] for name in model.STANDARD_PARAMETERS])
+
+
+def test_pseudo_inertia_is_the_second_moment_of_point_masses() -> None:
+    rng = np.random.default_rng(0)
+    mass, place = rng.uniform(0.1, 2, 7), rng.standard_normal((7, 3))
+    homogeneous = np.column_stack([place, np.ones(7)])
+    np.testing.assert_allclose(pseudo_inertia(ten_of(mass, place)), (homogeneous.T * mass) @ homogeneous, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["tx40", "puma560", "two_branch"])
+def test_regrouping_matrix_gives_the_torques_of_pinocchio(name: str) -> None:
+    model, oracle = emitted(name), PinocchioModel(load_robot(name))
+    K = physical_model(model).K
+    rng = np.random.default_rng(1)
+    chi = rng.uniform(0.1, 2, K.shape[1])
+    for _ in range(5):
+        q, qd, qdd = rng.uniform(-2, 2, (3, len(model.JOINTS)))
+        torque = oracle.torque(q, qd, qdd, chi)
+        np.testing.assert_allclose(model.inverse_dynamics(q, qd, qdd, K @ chi), torque, atol=1e-10 * np.abs(torque).max())
+
+
+def test_conditions_of_a_coupled_wrist_and_of_one_sided_friction(tx40) -> None:
+    wrist = next(c for c in physical_model(tx40).conditions if c.name == "inertia of joints 5, 6")
+    chi = dict.fromkeys(tx40.STANDARD_PARAMETERS, 0.0) | {"Ia5": 5.0, "Ia6": 2.0}
+    np.testing.assert_array_equal(wrist.matrix(np.array(list(chi.values()))), [[5, 2], [2, 2]])  # robot file: q6**2 + 2*q5*q6 of Ia6
+    named = [c.name for c in physical_model(emitted("emps_asymmetric")).conditions]
+    assert named == ["link 1", "Ia1", "FVP1", "FVN1", "FSP1", "FSN1"]
+
+
+@pytest.mark.parametrize("name", ["planar_2r", "tx40"])
+def test_feasible_is_least_squares_where_that_is_feasible(name: str) -> None:
+    """By the estimator, and by the semidefinite program itself: within a hundredth of sigma."""
+    model = emitted(name)
+    truth = model.base_parameters(model.VALUES)
+    seen = simulated(model, truth, 1e-4)
+    ols, found = estimate(seen), estimate(seen, FEASIBLE, model=model)
+    assert found.details["least_squares"]["feasible"]
+    np.testing.assert_array_equal(found.X, ols.X)
+    physical, options = physical_model(model), Options(margin=1e-9)
+    chi, weight = weighed(linear(seen, FEASIBLE, options).weighted, physical, options)
+    assert weight == 0 and np.abs((physical.K @ chi - ols.X) / ols.sigma).max() < 1e-2
+
+
+def test_noise_free_records_give_the_parameters_back(tx40) -> None:
+    truth = tx40.base_parameters(tx40.VALUES)
+    found = estimate(simulated(tx40, truth, 0.0), FEASIBLE, model=tx40)
+    np.testing.assert_allclose(found.X, truth, atol=1e-9)
+    standard = np.array(list(found.details["standard"].values()))
+    np.testing.assert_allclose(standard, values(tx40), atol=1e-3)  # nearest to the values, and these have the torques
+
+
+def test_optimum_is_that_of_a_parametrisation_of_all_physical_arms(arm) -> None:
+    """P = L L', friction and actuator inertia squares: every physical arm and no other; 4 kg in all, so that the mass of the links is told."""
+    X = arm.base_parameters(arm.VALUES)
+    X = X + np.array([0, 0, 0, 0, 0, 0, -0.1, 0, 0, -0.01, -0.35, 0, 0])  # ZZ2 too small for MX2, FV2 below zero
+    seen = simulated(arm, X, 0.5, N=60)
+    settings = EstimateSettings("feasible", options={"bootstrap": 0, "total_mass": 4.0, "margin": 1e-9})
+    found = estimate(seen, settings, model=arm)
+    assert found.status == "ok" and not found.details["least_squares"]["feasible"]
+    lower = np.tril_indices(4)
+
+    def chi(u: np.ndarray) -> np.ndarray:
+        value = {}
+        factors = np.zeros((2, 4, 4))
+        factors[0][lower], factors[1][lower] = u[:10], u[10:20]
+        matrices = factors @ factors.transpose(0, 2, 1)
+        for j, P in enumerate(4.0 * matrices / matrices[:, 3, 3].sum(), start=1):
+            J = np.trace(P[:3, :3]) * np.eye(3) - P[:3, :3]
+            ten = (J[0, 0], J[0, 1], J[0, 2], J[1, 1], J[1, 2], J[2, 2], *P[3, :3], P[3, 3])
+            value |= {f"{family}{j}": x for family, x in zip(INERTIAL, ten, strict=True)}
+        value |= dict(zip(("OFFSET1", "OFFSET2"), u[20:22], strict=True))
+        value |= dict(zip(("Ia1", "FV1", "FS1", "Ia2", "FV2", "FS2"), u[22:] ** 2, strict=True))
+        return np.array([value[name] for name in arm.STANDARD_PARAMETERS])
+
+    start = np.concatenate([np.eye(4)[lower], np.eye(4)[lower], np.zeros(2), np.full(6, 0.5)])
+    best = minimize(lambda u: np.sum((seen.Y - seen.W @ arm.base_parameters(chi(u))) ** 2), start, options={"maxiter": 600})
+    assert 1 - 1e-6 < best.fun / found.residual_norm**2 < 1 + 1e-6
+    np.testing.assert_allclose(arm.base_parameters(chi(best.x)), found.X, atol=2e-3)
+    assert found.residual_norm > found.details["least_squares"]["residual_norm"]
+
+
+def test_infeasible_parameters_are_blamed_on_what_contradicts(arm) -> None:
+    physical = physical_model(arm)
+    X = arm.base_parameters(arm.VALUES)
+    good = feasibility(physical, physical.base, X)
+    assert good.feasible and good.margin > 0 and not good.blocking and "physically feasible" in good.text
+    X = X.copy()
+    X[arm.BASE_PARAMETERS.index("FV2")] = -0.2
+    X[arm.BASE_PARAMETERS.index("ZZ2")] = 0.05  # with MX2 = 0.5 kg m and at most 2 kg: ZZ2 >= MX2**2/M2 = 0.125
+    judged = feasibility(physical, physical.base, X, Limits(bounds={"M2": (None, 2.0)}))
+    assert not judged.feasible and [name for name, _ in judged.blocking] == ["FV2", "link 2"]
+    assert judged.margin == pytest.approx(-0.2, abs=1e-6)
+    with pytest.raises(InputError, match=r"NOT physically feasible.*FV2"):
+        standard_parameters(physical, physical.base, X)
+
+
+def test_standard_parameters_have_the_same_torques(tx40) -> None:
+    physical = physical_model(tx40)
+    X = tx40.base_parameters(tx40.VALUES)
+    chi = standard_parameters(replace(physical, values={}), physical.base, X)  # nothing known of the robot
+    assert np.abs(chi - values(tx40)).max() > 1e-2  # another robot
+    assert min(physical.smallest(chi).values()) >= 0
+    np.testing.assert_allclose(physical.K @ chi, X, atol=1e-12)
+
+
+def test_limits_hold(arm) -> None:
+    physical = physical_model(arm)
+    limits = Limits(
+        bounds={"M1": (None, 1.5)},
+        total_mass=(3.0, 3.5),
+        centre={"2": ((0.0, 0.3), (-0.1, 0.1), (-0.1, 0.1))},
+        ellipsoid={"2": Ellipsoid((0.25, 0.0, 0.0), (0.5, 0.2, 0.2))},
+    )
+    chi = standard_parameters(physical, physical.base, arm.base_parameters(arm.VALUES), limits)
+    value = physical.named(chi)
+    assert value["M1"] <= 1.5 + 1e-8 and 3.0 - 1e-8 <= value["M1"] + value["M2"] <= 3.5 + 1e-8
+    assert -1e-8 <= value["MX2"] / value["M2"] <= 0.3 + 1e-8
+    P = pseudo_inertia(chi[physical.link(2)])
+    x, a = np.array([0.25, 0.0, 0.0]), np.array([0.5, 0.2, 0.2])
+    inside = (
+        P[3, 3] - (np.diag(P)[:3] / a**2).sum() + 2 * (P[3, :3] * x / a**2).sum() - P[3, 3] * (x**2 / a**2).sum()
+    )  # integral of 1 - (x - c)'A^-1(x - c)
+    assert inside >= -1e-8
+    weights = limit_rows(physical, limits).A[-1]
+    assert weights @ chi == pytest.approx(inside, abs=1e-12)
+
+
+@pytest.mark.parametrize("prior", ["euclidean", "entropic", "pullback"])
+def test_a_strong_pull_ends_at_the_values_and_auto_costs_one_per_cent(arm, prior: str) -> None:
+    seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.5)
+    solid = replace_values(arm)
+    free = estimate(seen, EstimateSettings("feasible", options={"bootstrap": 0}), model=solid)
+    strong = estimate(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": prior, "weight": 1e4}), model=solid)
+    inertial = [f"{family}{j}" for j in (1, 2) for family in INERTIAL]
+    assert max(abs(strong.details["standard"][name] - solid.VALUES[name]) for name in inertial) < 1e-3
+    auto = estimate(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": prior}), model=solid)
+    assert free.residual_norm <= auto.residual_norm <= 1.0101 * free.residual_norm and auto.details["weight"] > 0
+
+
+def replace_values(arm):
+    """The arm with thick links: the packaged ones are rods, whose pseudo-inertia is singular to the printed digits."""
+    from types import SimpleNamespace
+
+    thick = dict(arm.VALUES) | {"XX1": 0.01, "XX2": 0.01, "ZZ1": 0.172, "ZZ2": 0.172}
+    return SimpleNamespace(**{name: getattr(arm, name) for name in dir(arm) if not name.startswith("_")} | {"VALUES": thick})
+
+
+def test_bootstrap_is_seeded_and_has_the_size_of_the_scatter(arm) -> None:
+    truth = arm.base_parameters(arm.VALUES)
+    settings = EstimateSettings("feasible", options={"bootstrap": 12, "seed": 3})
+    first, again = (estimate(simulated(arm, truth, 0.3), settings, model=arm) for _ in range(2))
+    np.testing.assert_array_equal(first.sigma_corrected, again.sigma_corrected)
+    runs = np.array([estimate(simulated(arm, truth, 0.3, seed), FEASIBLE, model=arm).X for seed in range(20)])
+    ratio = np.median(first.sigma_corrected / runs.std(axis=0))
+    assert 0.5 < ratio < 2  # 12 resampled records and 20 new ones: 27 % at one deviation
+
+
+def test_json_keeps_the_standard_parameters(arm) -> None:
+    found = estimate(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
+    back = Estimate.from_json(found.to_json())
+    assert back.details["standard"] == pytest.approx(found.details["standard"])
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"total_mass": -1.0}, "total_mass"),
+        ({"bounds": {"M1": [3, None], "MX1": [None, -9]}, "centre": {"1": [[0, 1], [0, 1], [0, 1]]}}, "centre of link 1"),
+        ({"bounds": {"mass": [0, 1]}}, "no standard parameter mass"),
+        ({"centre": {"9": [[0, 1], [0, 1], [0, 1]]}}, "no link '9'"),
+        ({"ellipsoid": {"1": {"centre": [0, 0, 0], "axes": [1, 0, 1]}}}, r"ellipsoid\.1\.axes"),
+        ({"prior": "cad"}, "euclidean or entropic"),
+        ({"margin": 0}, "margin"),
+        ({"pull": 1}, "unknown key pull"),
+    ],
+)
+def test_what_cannot_be_asked(arm, options: dict, said: str) -> None:
+    seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.1)
+    with pytest.raises(InputError, match=said):
+        estimate(seen, EstimateSettings("feasible", options={"bootstrap": 0, **options}), model=arm)
+
+
+def test_needs_the_model_and_values_for_a_pull(arm) -> None:
+    seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.1)
+    with pytest.raises(InputError, match="needs the model"):
+        estimate(seen, FEASIBLE)
+    with pytest.raises(SettingsError, match="no values of"):
+        estimate(
+            simulated(emitted("rx90"), np.ones(len(emitted("rx90").BASE_PARAMETERS)), 1.0),
+            EstimateSettings("feasible", options={"prior": "euclidean", "bootstrap": 0}),
+            model=emitted("rx90"),
+        )
+
+
+def test_without_the_extra_one_line_says_so(arm, monkeypatch) -> None:
+    real = builtins.__import__
+
+    def without(name, *args, **kwargs):
+        if name == "cvxpy":
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(InputError, match=r"pip install symgen\[consistency\]"):
+        estimate(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
+
+
+def test_tx40_record(tx40, tx40_data) -> None:
+    """Least squares of the public record is infeasible; the feasible estimate costs less than 5 % (measured 0.24 %), and a robot has its torques."""
+    study = study_from_mapping(dataset_study("tx40"))
+    seen = observe(tx40, read_records(study.record, tx40)[0], study)
+    ols, found = estimate(seen), estimate(seen, FEASIBLE, model=tx40)
+    told = found.details["least_squares"]
+    assert not told["feasible"] and told["blocking"][0]["condition"] == "link 3" and "NOT physically feasible" in found.message
+    assert 1 < found.relative_error / ols.relative_error < 1.05
+    chi = np.array([found.details["standard"][name] for name in tx40.STANDARD_PARAMETERS])
+    for j in range(1, 7):
+        ten = [found.details["standard"][f"{family}{j}"] for family in INERTIAL]
+        assert np.linalg.eigvalsh(pseudo_inertia(np.array(ten)))[0] > 0
+    value = found.details["standard"]
+    assert np.linalg.eigvalsh([[value["Ia5"], value["Ia6"]], [value["Ia6"], value["Ia6"]]])[0] > 0
+    assert np.linalg.eigvalsh([[value["FV5"], value["FVM6"]], [value["FVM6"], value["FV6"]]])[0] > 0
+    oracle = PinocchioModel(load_robot("tx40"))
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        q, qd, qdd = rng.uniform(-2, 2, (3, 6))
+        torque = oracle.torque(q, qd, qdd, chi)
+        np.testing.assert_allclose(tx40.inverse_dynamics(q, qd, qdd, found.X), torque, atol=1e-9 * np.abs(torque).max())
+    system = linear(seen, FEASIBLE, Options())
+    assert residual_norm(system.weighted, found.X) == pytest.approx(found.residual_norm, rel=1e-9)
