@@ -37,9 +37,17 @@ def cestac(
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler whose workers do the runs, such as tcp://10.0.0.1:8786.")
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print cestac.json instead of tables.")] = False,
+    advise: Annotated[
+        bool,
+        typer.Option(
+            "--advise", help="Predict the coarsest steps that keep the change below 1 % and 5 %, and confirm them by --runs runs each."
+        ),
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print cestac.json (advice.json) instead of tables.")] = False,
 ) -> None:
     """Study the encoder resolution. Exit code 1 where least squares is biased at one of the steps.
+
+    With --advise, exit code 1 where it would be at one of the steps of --delta, or where the runs contradict the prediction.
 
     A long study with -o keeps its runs in DIR/runs as it goes: interrupted or killed, the same command goes on.
     """
@@ -52,6 +60,11 @@ def cestac(
 
         study, folder, records = study_and_records(record, model)
         study = changed(study, {key: value for key, value in given.items() if value is not None})
+        if advise:
+            from symgen.cli.advice import advised
+
+            asked = study.cestac.delta if delta else ()
+            raise typer.Exit(NEGATIVE if advised(model, study, folder, records, asked, output, json) else 0)
         checkpoint = None if output is None else Checkpoint(output)
         with progress_bar() as progress, kept_runs(checkpoint):
             result = study_of_resolution.cestac(
