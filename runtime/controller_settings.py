@@ -78,7 +78,7 @@ class Torque:
 
     def __post_init__(self) -> None:
         if self.saturation != "limits":
-            _positive("saturation", self.saturation)  # type: ignore[arg-type]
+            _positive("saturation", self.saturation)
         _positive("step", self.step)
         _positive("bandwidth", self.bandwidth)
         _not_negative("noise", self.noise)

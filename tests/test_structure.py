@@ -25,7 +25,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/io/study_files.py"),
     "sympy": ("symgen/regroup/symbolic.py",),
     "mpmath": ("symgen/derive/precise.py", "symgen/regroup/general.py"),
-    "casadi": ("symgen/derive/lagrange.py", "runtime/studies/simulation.py", "runtime/studies/excitation.py", "generated/"),
+    "casadi": ("symgen/derive/lagrange.py", "runtime/studies/simulation", "runtime/studies/excitation.py", "generated/"),
     "pooch": ("runtime/io/datasets.py",),
     "polars": ("runtime/io/tables.py",),
     "h5py": ("runtime/io/mat.py",),

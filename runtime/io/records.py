@@ -17,14 +17,12 @@ from runtime.drives import Drives
 from runtime.errors import InputError
 from runtime.io.conversion import column_names, conversion, finite_columns, reference_columns
 from runtime.io.table import Table, read_table
+from runtime.io.timing import SECONDS, clock
 from runtime.model import GeneratedModel
 from runtime.record import Record
 from runtime.study import RecordSettings
 
 Array = np.ndarray
-
-TIME = {"s": 1.0, "ms": 1e-3}  # to s
-RATE_TOLERANCE = 1e-3  # between the rate of the settings and that of the time column
 
 
 def read_record(settings: RecordSettings, drives: Drives | None = None, *, folder: Path | None = None) -> Record:
@@ -91,28 +89,5 @@ def _time(settings: RecordSettings, table: Table, name: str | None, N: int) -> t
         if settings.rate is None:
             raise InputError("no time column and no rate; set record.rate (Hz) or record.columns.t", file=table.file)
         return np.arange(N) / settings.rate, settings.rate
-    t = finite_columns(table, [name])[:, 0] * TIME[settings.units.t]
-    if len(t) < 2:
-        raise InputError(f"{len(t)} samples; a record needs more", file=table.file)
-    step = np.diff(t)
-    if (step <= 0).any():
-        i = int(np.argmax(step <= 0))
-        raise InputError(
-            f"time goes from {t[i]:g} s to {t[i + 1]:g} s; expected increasing time", file=table.file, column=name, row=table.row(i + 1)
-        )
-    rate = (len(t) - 1) / (t[-1] - t[0])
-    if settings.rate is not None and abs(rate / settings.rate - 1) > RATE_TOLERANCE:
-        raise InputError(
-            f"time runs at {rate:g} Hz, record.rate is {settings.rate:g} Hz; correct one, or the unit of time", file=table.file, column=name
-        )
-    deviation = np.abs(t - t[0] - np.arange(len(t)) / rate) * rate
-    if deviation.max() > settings.jitter:
-        i = int(np.argmax(np.abs(step * rate - 1)))
-        raise InputError(
-            f"time is not uniform: off the grid by up to {deviation.max():.3g} sampling periods, step {step[i]:g} s here, {1 / rate:g} s on average; "
-            "resample the record, or raise record.jitter if the clock is at fault",
-            file=table.file,
-            column=name,
-            row=table.row(i + 1),
-        )
-    return t, settings.rate or float(rate)
+    t = finite_columns(table, [name])[:, 0] * SECONDS[settings.units.t]
+    return t, clock(settings, lambda: [table], name).rate
