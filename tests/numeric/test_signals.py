@@ -33,6 +33,15 @@ def test_lowpass_shifts_no_phase_and_halves_power_at_the_cutoff():
         np.testing.assert_allclose(lowpass_filtered(x, RATE, Lowpass())[inside], gain * x[inside], atol=1e-3)
 
 
+@pytest.mark.parametrize("window", [3, 5, 7])
+def test_median_is_that_of_sorted_windows(window):
+    for N in (1, 2, 3, 4, 40):
+        x = np.random.default_rng(N).standard_normal((N, 3)).round(1)  # equal values among them
+        extended = np.pad(x, ((window // 2, window // 2), (0, 0)), mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(extended, window, axis=0)
+        np.testing.assert_array_equal(median_filtered(x, window), np.sort(windows, axis=-1)[..., window // 2])
+
+
 def test_median_removes_an_outlier_and_keeps_ends():
     x = np.linspace(1, 2, 50)[:, None].repeat(2, axis=1)
     y = x.copy()
