@@ -177,3 +177,14 @@ def excesses(
                 limit = upper[j] if x[k, j] > upper[j] else lower[j]
                 found.append(Excess(what, j + 1, float(x[k, j]), float(limit), float(t[k])))
     return found
+
+
+def usage(model: GeneratedModel, motion: Motion, limits: Limits, rate: float, X: Array) -> dict[str, list[float]]:
+    """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint; of a range, measured from its middle."""
+    functions: Any = model
+    _, q, qd, qdd = motion.sampled(rate)
+    middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
+    shares = {"position": (q - middle) / half, "velocity": qd / limits.qd, "acceleration": qdd / limits.qdd}
+    if np.isfinite(limits.tau).any():
+        shares["torque"] = functions.inverse_dynamics(q, qd, qdd, X) / limits.tau
+    return {what: np.abs(x).max(axis=0).tolist() for what, x in shares.items()}

@@ -59,7 +59,7 @@ class ExcitationSettings:
     smooth: float = 0.05
     torque_sigma: tuple[float, ...] | None = None
     starts: int = 10
-    iterations: int = 100
+    iterations: int = 200
     seed: int = 1
 
     def __post_init__(self) -> None:

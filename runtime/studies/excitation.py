@@ -275,7 +275,7 @@ def _minimised(
     options: dict[str, Any] = {
         "ipopt": {
             "hessian_approximation": "limited-memory",
-            "limited_memory_max_history": 20,
+            "limited_memory_max_history": 8,
             "max_iter": iterations,
             "print_level": 0,
             "sb": "yes",

@@ -15,6 +15,7 @@ VERBS = {
     "check": "Verify the certificate of a robot's base parameters.",
     "identify": "Estimate the base parameters from a measured record.",
     "cestac": "Judge whether the encoder resolves enough for an identification.",
+    "excite": "Search a motion that excites the parameters within the limits.",
     "datasets": "List the measured records this program knows, and where they lie.",
     "new": "Write a skeleton robot file.",
     "demo": "The main job end to end, with a report.",
