@@ -202,6 +202,29 @@ class ValidateSettings:
 
 
 @dataclass(frozen=True)
+class PayloadSettings:
+    """Records with a load fixed to a link, beside those of the study without it.
+
+    link : number of the link that carries it; default: the last.   known : of XX XY XZ YY YZ ZZ MX MY MZ M of the load, at the frame of
+    the link, what was weighed or computed, SI.   friction : the loaded records have friction of their own.
+    gains : also estimate the torque constants of the drives from the load; its M must be known.
+    """
+
+    record: tuple[RecordSettings, ...] = ()
+    link: int | None = None
+    known: Mapping[str, float] = field(default_factory=dict)
+    friction: bool = False
+    gains: bool = False
+
+    def __post_init__(self) -> None:
+        families = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+        for family in self.known:
+            _require(family in families, ("known", family), f"unknown parameter; a load has {', '.join(families)}")
+        _require(self.known.get("M", 1.0) > 0, ("known", "M"), f"{self.known.get('M')} kg; expected a positive mass")
+        _require(not self.gains or "M" in self.known, ("gains",), "torque constants need a weighed load: set known: {M: ...}")
+
+
+@dataclass(frozen=True)
 class CestacSettings:
     """Encoder-resolution study, eqs. (15)-(22), (28).
 
@@ -229,7 +252,7 @@ class CestacSettings:
 @dataclass(frozen=True)
 class Study:
     """All settings. `record` holds one or several records of one robot; `controller`: the closed loop of simulation, IV,
-    DIDIM and CLOE; `excitation`: the search for a motion."""
+    DIDIM and CLOE; `payload`: records with a load; `excitation`: the search for a motion."""
 
     symgen: int = SCHEMA
     record: tuple[RecordSettings, ...] = ()
@@ -239,6 +262,7 @@ class Study:
     essential: EssentialSettings = field(default_factory=EssentialSettings)
     validate: ValidateSettings = field(default_factory=ValidateSettings)
     cestac: CestacSettings = field(default_factory=CestacSettings)
+    payload: PayloadSettings | None = None
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
 
