@@ -37,7 +37,8 @@ from runtime.processes import results
 from runtime.record import Record
 from runtime.runs import Runs
 from runtime.signals import filtered_states
-from runtime.studies import distributed
+from runtime.studies import distributed, fused_cestac
+from runtime.studies.compiled import CompiledModel
 from runtime.study import CestacSettings, Study, to_mapping
 
 Array = np.ndarray
@@ -76,7 +77,7 @@ def cestac(
     progress : called with the number of runs done and their total.
     checkpoint : where runs are kept while the study lasts; those of an interrupted or shorter study with the same settings are not repeated.
     """
-    settings = study.cestac
+    settings, model = study.cestac, fused_cestac.usable(model)
     records = (records,) if isinstance(records, Record) else tuple(records)
     drives = Drives.from_mapping(model.DRIVES) if drives is None and model.DRIVES is not None else drives
     if settings.side == "motor" and drives is None:
@@ -102,6 +103,7 @@ def cestac(
         "estimate": to_mapping(study.estimate),
         "cestac": to_mapping(settings),
         "rate": [record.rate for record in records],
+        "target": "c" if isinstance(model, CompiledModel) else "numpy",
         "torque_side": "joint" if drives is None else "motor",
     }
     finished = checkpoint.resume(_identity(task, described, reference.provenance), len(names)) if checkpoint else Runs.of((), len(names))
@@ -153,6 +155,7 @@ def _all_runs(
                 progress(done, total)
     finally:  # also when Ctrl-C or an error ends the study
         forget()
+        fused_cestac.forget()
         if checkpoint is not None:
             checkpoint.flush()
     return Runs.joined(parts, b)
@@ -160,10 +163,13 @@ def _all_runs(
 
 def _results(task: Task, blocks: Sequence[tuple[Key, ...]], workers: int, scheduler: str | None) -> Iterator[Runs]:
     """Blocks of runs, from this process, several, or a cluster."""
+    in_c = isinstance(task.model, CompiledModel)
+    run = fused_cestac.run_block if in_c else run_block
     if not blocks or not (workers or scheduler):
-        return results(run_block, task, blocks)
-    sent = replace(task, model=task.model if isinstance(task.model, ModelText) else ModelText.of(task.model))
-    return distributed.results(run_block, sent, blocks, scheduler) if scheduler else results(run_block, sent, blocks, workers)
+        return results(run, task, blocks)
+    text = fused_cestac.CompiledText if in_c else ModelText
+    sent = replace(task, model=task.model if isinstance(task.model, ModelText) else text.of(task.model))
+    return distributed.results(run, sent, blocks, scheduler) if scheduler else results(run, sent, blocks, workers)
 
 
 def _identity(task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def one_run(task: Task, key: tuple[int, int]) -> Run:
         X = system.solve().X
         norms, method = np.array([joint.residual_norm(X) for joint in system.raw.joints]), TRIANGULAR
     else:
-        rows = [part.rows(level, _part_key(draw, k)) for k, part in enumerate(work.parts)]
+        rows = [part.rows(level, part_key(draw, k)) for k, part in enumerate(work.parts)]
         fit = least_squares(lambda: rows, work.columns, len(task.names))
         X, norms, method = fit.X, fit.residual_norms, fit.method
     return Run(number, run, tuple(X.tolist()), float(np.linalg.norm(norms)), method)
@@ -110,7 +110,7 @@ def observed(task: Task, model: GeneratedModel, level: Level, draw: tuple[int, .
     """The system with perturbed measurements, by the way of the identification."""
     observations = []
     for k, part in enumerate(task.parts):
-        key = _part_key(draw, k)
+        key = part_key(draw, k)
         states = filtered_states(perturbed_position(part.q, level, task.settings, task.drives, key[0]), part.rate, part.selection.signals)
         torque = part.torque
         if level.torque:
@@ -121,7 +121,7 @@ def observed(task: Task, model: GeneratedModel, level: Level, draw: tuple[int, .
     return observations[0] if len(observations) == 1 else stack(observations)
 
 
-def _part_key(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def part_key(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Streams of the positions and of the torques of record k: (*draw, 2 k) and (*draw, 2 k + 1), positions of record 0 `draw` itself.
 
     A draw is the same with and without torques, and whatever records follow.

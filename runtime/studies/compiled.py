@@ -52,8 +52,9 @@ def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: 
     """
     try:
         path = source or _beside(model)
-        library = shared_object(path, _text(path), cache or cache_folder(), lambda found: _opened(found, model))
-        compiled = CompiledModel(cast(DynamicModel, model), library)
+        text = _text(path)
+        library = shared_object(path, text, cache or cache_folder(), lambda found: _opened(found, model))
+        compiled = CompiledModel(cast(DynamicModel, model), library, text)
         compiled.check()
         return cast(GeneratedModel, compiled)
     except (NotCompiledError, OSError) as e:
@@ -84,10 +85,10 @@ class Signals:
 
 
 class CompiledModel:
-    """The API of the generated module; what the C file lacks is that of the module. `signals`: for other C code."""
+    """The API of the generated module; what the C file lacks is that of the module. `signals`: for other C code. `source`: the C file's text."""
 
-    def __init__(self, model: DynamicModel, library: ctypes.CDLL) -> None:
-        self._model, self._library = model, library
+    def __init__(self, model: DynamicModel, library: ctypes.CDLL, source: bytes) -> None:
+        self._model, self._library, self.source = model, library, source
         self.signals = _signals(library, model)
         self._n, self._b = len(model.JOINTS), len(model.BASE_PARAMETERS)
         self._third = _third_of_last_cache()
@@ -96,6 +97,11 @@ class CompiledModel:
         if name == "_model":  # while it is being copied
             raise AttributeError(name)
         return getattr(self._model, name)
+
+    @property
+    def module(self) -> GeneratedModel:
+        """The NumPy module."""
+        return cast(GeneratedModel, self._model)
 
     def regressor(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
         """D, shape (N, n, b): a view on one store of shape (b, n, N)."""
