@@ -51,6 +51,19 @@ class ArrayTable:
         return x.reshape(len(x) if x.ndim else 1, -1).astype(float)
 
 
+@dataclass(frozen=True, eq=False)
+class ArrayBlock(ArrayTable):
+    """Samples `first`, first + 1 ... of arrays whose shapes were checked as a whole; scalars as they are."""
+
+    first: int = 0
+
+    def row(self, i: int) -> str:
+        return f"sample {self.first + i + 1}"
+
+    def _columns(self, name: str) -> Array:
+        return self.arrays[name].reshape(len(self.arrays[name]), -1).astype(float)
+
+
 def numeric(arrays: Mapping[str, object]) -> dict[str, Array]:
     """Those of the arrays that hold real numbers (booleans included)."""
     return {k: v for k, v in arrays.items() if isinstance(v, np.ndarray) and v.dtype.kind in "biuf"}

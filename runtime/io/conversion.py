@@ -13,7 +13,7 @@ import numpy as np
 
 from runtime.drives import Drives
 from runtime.errors import InputError
-from runtime.io.table import Table
+from runtime.io.table import Named, Table
 from runtime.study import Columns, RecordSettings
 
 Array = np.ndarray
@@ -61,7 +61,7 @@ def conversion(settings: RecordSettings, drives: Drives | None, first: Table, la
     return Conversion(positions, scale, replace(drives, torque_constant=constant, coupling=settings.coupling))
 
 
-def column_names(settings: RecordSettings, first: Table, last: Table) -> Columns:
+def column_names(settings: RecordSettings, first: Named, last: Named) -> Columns:
     """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out."""
     given = settings.columns
     t = given.t if given.t is not None or settings.rate is not None or "t" not in first.names else "t"
@@ -79,7 +79,7 @@ def reference_columns(table: Table, names: Sequence[str], n: int) -> Array | Non
     return q_r
 
 
-def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
+def _numbered(quantity: str, table: Named) -> tuple[str, ...]:
     found = sorted((int(m[1]), name) for name in table.names if (m := re.fullmatch(rf"{quantity}(\d+)", name)))
     if not found:
         raise InputError(

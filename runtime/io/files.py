@@ -5,7 +5,10 @@ from __future__ import annotations
 import gzip
 import hashlib
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO, cast
 
 from runtime.errors import InputError
 
@@ -22,6 +25,31 @@ def read_bytes(path: Path) -> bytes:
         return gzip.decompress(data)
     except (OSError, EOFError, zlib.error) as e:
         raise InputError(f"damaged gzip file ({e}); copy it again", file=str(path)) from e
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """The uncompressed bytes of a file as a stream; what goes wrong while it is read names the file."""
+    try:
+        with path.open("rb") as plain:
+            if plain.peek(2)[:2] != b"\x1f\x8b":
+                yield plain
+                return
+            with gzip.GzipFile(fileobj=plain) as unpacked:
+                yield cast(BinaryIO, unpacked)
+    except (gzip.BadGzipFile, EOFError, zlib.error) as e:
+        raise InputError(f"damaged gzip file ({e}); copy it again", file=str(path)) from e
+    except OSError as e:
+        raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of the uncompressed bytes of a file of any size, 64 hexadecimal digits."""
+    with opened(path) as stream:
+        digest = hashlib.sha256()
+        while part := stream.read(2**20):
+            digest.update(part)
+        return digest.hexdigest()
 
 
 def sha256(data: bytes) -> str:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from io import TextIOWrapper
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
 from runtime.errors import InputError
+from runtime.io.files import opened
 from runtime.io.naming import check_names
 
 Array = np.ndarray
@@ -50,6 +54,54 @@ class TextTable:
         return InputError("a field that is not a number", file=self.file)
 
 
+@dataclass(frozen=True, eq=False)
+class TextBlocks:
+    """A text file that is read by blocks of lines."""
+
+    path: Path
+    file: str
+    names: tuple[str, ...]
+    delimiter: str | None
+    has_header: bool
+
+    def samples(self, names: Sequence[str]) -> int:
+        """Length of the columns."""
+        check_names(names, self.names, self.file)
+        return sum(1 for _ in self._lines())
+
+    def blocks(self, names: Sequence[str], size: int) -> Iterator[TextTable]:
+        """Tables of `size` lines each, in order; `names` are looked up when columns are asked for."""
+        check_names(names, self.names, self.file)
+        lines = self._lines()
+        while block := list(islice(lines, size)):
+            _check_widths(block, self.names, self.delimiter, self.file)
+            yield TextTable(self.file, self.names, tuple(line for _, line in block), tuple(k for k, _ in block), self.delimiter)
+
+    def _lines(self) -> Iterator[tuple[int, str]]:
+        return islice(_numbered_lines(self.path), 1 if self.has_header else 0, None)
+
+
+def text_blocks(path: Path, file: str) -> TextBlocks:
+    """A text file to be read by blocks; its first line tells the columns, as in `read_text`."""
+    first = next(_numbered_lines(path), None)
+    if first is None:
+        raise InputError("no line of numbers", file=file)
+    names, has_header, delimiter = _header(first[1], file)
+    return TextBlocks(path, file, names, delimiter, has_header)
+
+
+def _numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Lines that hold something, comments aside, with their numbers from 1."""
+    try:
+        with opened(path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
+            for k, raw in enumerate(text, start=1):
+                line = raw.strip()
+                if line and not line.startswith("#"):
+                    yield k, line
+    except UnicodeDecodeError as e:
+        raise InputError(f"not a text file in UTF-8 (byte {e.start} of a block)", file=path.name) from None
+
+
 def read_text(data: bytes, file: str) -> TextTable:
     """Table of the bytes of a text file; without a header line columns are called 1, 2, 3 ..."""
     try:
@@ -60,22 +112,32 @@ def read_text(data: bytes, file: str) -> TextTable:
     numbered = [(k, line) for k, line in numbered if line and not line.startswith("#")]
     if not numbered:
         raise InputError("no line of numbers", file=file)
-    delimiter = _delimiter(numbered[0][1])
-    header = _fields(numbered[0][1], delimiter)
-    if all(_is_number(x) for x in header):
-        names = tuple(str(i + 1) for i in range(len(header)))
-    else:
-        names, numbered = tuple(header), numbered[1:]
+    names, has_header, delimiter = _header(numbered[0][1], file)
+    numbered = numbered[1:] if has_header else numbered
     if not numbered:
         raise InputError(f"no line of numbers under the header {', '.join(names)}", file=file)
-    double = sorted({name for name in names if names.count(name) > 1})
+    _check_widths(numbered, names, delimiter, file)
+    return TextTable(file, names, tuple(line for _, line in numbered), tuple(k for k, _ in numbered), delimiter)
+
+
+def _header(line: str, file: str) -> tuple[tuple[str, ...], bool, str | None]:
+    """Names of the columns by the first line, whether it is a header, and the delimiter."""
+    delimiter = _delimiter(line)
+    header = _fields(line, delimiter)
+    if all(_is_number(x) for x in header):
+        return tuple(str(i + 1) for i in range(len(header))), False, delimiter
+    double = sorted({name for name in header if header.count(name) > 1})
     if double:
         raise InputError(f"header names {', '.join(double)} more than once", file=file)
+    return tuple(header), True, delimiter
+
+
+def _check_widths(numbered: Sequence[tuple[int, str]], names: Sequence[str], delimiter: str | None, file: str) -> None:
+    """Raise InputError at the first line that does not have one field per name."""
     for k, line in numbered:
         width = len(_fields(line, delimiter)) if delimiter is None or '"' in line else line.count(delimiter) + 1
         if width != len(names):
             raise InputError(f"{width} fields; expected {len(names)} ({', '.join(names)})", file=file, row=f"line {k}")
-    return TextTable(file, names, tuple(line for _, line in numbered), tuple(k for k, _ in numbered), delimiter)
 
 
 def _delimiter(line: str) -> str | None:

@@ -1,0 +1,136 @@
+"""From the files of a measurement to a record that is read by blocks, joint side, SI: `runtime.io.records` for files larger than memory.
+
+    stream = open_streams(study.record, model, block=65536)[0]
+    reduction = runtime.streaming.reduce(model, [stream], study)
+
+The same settings, checks and errors; hashes and the clock are read when the stream is opened, finite numbers are required as blocks come by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from runtime.drives import Drives
+from runtime.errors import InputError
+from runtime.io.conversion import Conversion, column_names, conversion, finite_columns
+from runtime.io.files import sha256_of
+from runtime.io.records import file_hashes, record_files
+from runtime.io.table import BLOCK_READERS, BlockTable, open_table
+from runtime.io.timing import SECONDS, clock
+from runtime.model import GeneratedModel
+from runtime.record import SHORTEST
+from runtime.study import Columns, RecordSettings
+
+Array = np.ndarray
+
+BLOCK = 65536  # samples read at a time
+LARGE = 100_000_000  # bytes of the files of a record from which it is read by blocks when nothing is said
+
+
+@dataclass(frozen=True, eq=False)
+class FileStream:
+    """A record in files, read by blocks of `block` samples."""
+
+    name: str
+    n: int
+    rate: float
+    files: Mapping[str, str]
+    samples: int
+    block: int
+    settings: RecordSettings
+    columns: Columns
+    tables: tuple[BlockTable, ...]  # of the positions, of the torques; one where they share a file
+    side: Conversion
+
+    def __len__(self) -> int:
+        return self.samples
+
+    def times(self) -> Iterator[Array]:
+        """Time of the samples, s, by blocks."""
+        if self.columns.t is None:
+            for a in range(0, self.samples, self.block):
+                yield np.arange(a, min(a + self.block, self.samples)) / self.rate
+        else:
+            for table in self.tables[0].blocks([self.columns.t], self.block):
+                yield finite_columns(table, [self.columns.t])[:, 0] * SECONDS[self.settings.units.t]
+
+    def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
+        """t (B,), q (B, n), tau (B, n), joint side, SI."""
+        time = [] if self.columns.t is None else [self.columns.t]
+        first = self.tables[0].blocks([*time, *self.columns.q, *(self.columns.tau if len(self.tables) == 1 else ())], self.block)
+        last = None if len(self.tables) == 1 else self.tables[1].blocks(self.columns.tau, self.block)
+        for a, table in zip(range(0, self.samples, self.block), first, strict=True):
+            torques = table if last is None else next(last)
+            q, tau = finite_columns(table, self.columns.q), finite_columns(torques, self.columns.tau)
+            if self.columns.t is None:
+                t = np.arange(a, a + len(q)) / self.rate
+            else:
+                t = finite_columns(table, time)[:, 0] * SECONDS[self.settings.units.t]
+            yield t, self.side.position(q), self.side.torque(tau)
+
+
+def open_stream(settings: RecordSettings, drives: Drives | None = None, *, folder: Path | None = None, block: int = BLOCK) -> FileStream:
+    """The record that the settings describe, to be read by blocks of `block` samples; its files are read once, for hashes and clock."""
+    if block < SHORTEST:
+        raise InputError(f"blocks of {block} samples; expected at least {SHORTEST}")
+    paths = record_files(settings, folder)
+    tables = tuple(open_table(path) for path in paths)
+    first, last = tables[0], tables[-1]
+    names = column_names(settings, first, last)
+    samples = first.samples([*([] if names.t is None else [names.t]), *names.q])
+    beginning, torques = next(first.blocks(names.q, SHORTEST)), next(last.blocks(names.tau, SHORTEST))
+    q, tau = beginning.stack(names.q), torques.stack(names.tau)
+    others = last.samples(names.tau)
+    if q.shape != tau.shape or others != samples:
+        raise InputError(
+            f"positions {(samples, q.shape[1])} in {first.file}, torques {(others, tau.shape[1])} in {last.file}; "
+            "expected as many samples and joints in both"
+        )
+    n = q.shape[1]
+    if samples < SHORTEST:
+        raise InputError(f"{samples} samples; a record has at least {SHORTEST}", file=first.file)
+    if drives is not None and drives.n != n:
+        raise InputError(f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file)
+    return FileStream(
+        name=settings.name or settings.dataset or paths[0].name.split(".")[0],
+        n=n,
+        rate=_rate(settings, first, names.t, block),
+        files=file_hashes(settings, [sha256_of(path) for path in paths]),
+        samples=samples,
+        block=block,
+        settings=settings,
+        columns=names,
+        tables=tables,
+        side=conversion(settings, drives, beginning, torques, n),
+    )
+
+
+def open_streams(
+    settings: Sequence[RecordSettings], model: GeneratedModel, *, folder: Path | None = None, block: int = BLOCK
+) -> list[FileStream]:
+    """Several records of the robot of an emitted model, with its drives."""
+    drives = None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
+    streams = [open_stream(s, drives, folder=folder, block=block) for s in settings]
+    for stream in streams:
+        if stream.n != len(model.JOINTS):
+            raise InputError(f"{stream.n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}", file=stream.name)
+    return streams
+
+
+def are_large(settings: Sequence[RecordSettings], folder: Path | None = None) -> bool:
+    """Whether the files of these records, of formats that can be read by blocks, hold LARGE bytes or more in all; those of data sets do not."""
+    paths = [path for s in settings if s.dataset is None for path in record_files(s, folder)]
+    readable = all(any(suffix.lower() in BLOCK_READERS for suffix in path.suffixes) for path in paths)
+    return readable and sum(path.stat().st_size for path in paths if path.is_file()) >= LARGE
+
+
+def _rate(settings: RecordSettings, table: BlockTable, time: str | None, block: int) -> float:
+    if time is not None:
+        return clock(settings, lambda: table.blocks([time], block), time).rate
+    if settings.rate is None:
+        raise InputError("no time column and no rate; set record.rate (Hz) or record.columns.t", file=table.file)
+    return settings.rate

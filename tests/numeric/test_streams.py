@@ -1,0 +1,259 @@
+"""Records read by blocks: every format gives the samples of `read_record`, and the identification by blocks that of the record in memory."""
+
+import gzip
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from runtime import Drives, load_model, observe, read_record, read_records, study_from_mapping
+from runtime.errors import InputError, SettingsError
+from runtime.essential import essential
+from runtime.estimators import estimate
+from runtime.io.datasets import dataset_study
+from runtime.io.streams import are_large, open_stream
+from runtime.observation import stack
+from runtime.record_stream import RecordStream
+from runtime.streaming import halves, reduce
+from runtime.study import EstimateSettings, RecordSettings
+from runtime.validation import cross_validation, split_validation, weak_directions
+
+N, RATE = 1003, 500.0
+DRIVES = Drives([[30.0, 0.0], [12.0, -20.0]], [0.1, -0.2], [0.5, 0.4])
+
+
+@pytest.fixture(scope="module")
+def samples():
+    rng = np.random.default_rng(3)
+    return np.arange(N) / RATE, rng.normal(size=(N, 2)).cumsum(axis=0), rng.normal(size=(N, 2))
+
+
+def write(kind, folder, samples):
+    """A record file of the kind, and the columns that its settings name."""
+    t, q, tau = samples
+    path = folder / f"record.{kind.split()[0]}"
+    named = {"t": t, "q1": q[:, 0], "q2": q[:, 1], "tau1": tau[:, 0], "tau2": tau[:, 1]}
+    columns = {}
+    if kind.startswith("csv"):
+        text = (
+            "# a comment\n"
+            + ",".join(named)
+            + "\n"
+            + "\n".join(",".join(map(repr, row)) for row in np.column_stack(list(named.values())).tolist())
+        )
+        path.write_bytes(gzip.compress(text.encode()) if kind.endswith("gz") else text.encode())
+        if kind.endswith("gz"):
+            path = path.rename(folder / "record.csv.gz")
+    elif kind == "npz":
+        np.savez(path, **named, gain=np.array(2.0))
+    elif kind == "npz compressed":
+        np.savez_compressed(path, **named)
+    elif kind == "npz matrices":
+        np.savez(path, t=t[None], Q=np.asfortranarray(q), T=tau.astype(np.float32))
+        columns = {"q": ["Q"], "tau": ["T"]}
+    elif kind == "npy":
+        np.save(path, np.column_stack([t, q, tau]))
+        columns = {"t": "1", "q": ["2", "3"], "tau": ["4", "5"]}
+    elif kind == "parquet":
+        polars = pytest.importorskip("polars")
+        polars.DataFrame({**named, "note": ["x"] * N}).write_parquet(path, row_group_size=300)
+    return {"files": [path.name], "columns": columns}
+
+
+def settings(given, **others):
+    return study_from_mapping({"record": {**given, **others}}).record[0]
+
+
+@pytest.mark.parametrize("block", [10, 97, 500, 5000])
+@pytest.mark.parametrize("kind", ["csv", "csv gz", "npz", "npz compressed", "npz matrices", "npy", "parquet"])
+def test_formats_by_blocks(tmp_path, samples, kind, block):
+    given = settings(write(kind, tmp_path, samples), side="motor", units={"tau": "A"})
+    whole = read_record(given, DRIVES, folder=tmp_path)
+    stream = open_stream(given, DRIVES, folder=tmp_path, block=block)
+    assert (len(stream), stream.rate, stream.n, dict(stream.files), stream.name) == (N, whole.rate, 2, dict(whole.files), "record")
+    parts = list(stream.blocks())
+    assert [len(t) for t, _, _ in parts] == [min(block, N - a) for a in range(0, N, block)]
+    for found, expected in zip(zip(*parts, strict=True), (whole.t, whole.q, whole.tau), strict=True):
+        np.testing.assert_array_equal(np.concatenate(found), expected)
+    np.testing.assert_array_equal(np.concatenate(list(stream.times())), whole.t)
+
+
+def test_two_files_and_a_rate(tmp_path, samples):
+    np.save(tmp_path / "q.npy", samples[1])
+    np.savez(tmp_path / "tau.npz", tau=samples[2])
+    given = settings({"files": ["q.npy", "tau.npz"], "columns": {"q": ["1", "2"], "tau": ["tau"]}}, rate=RATE, units={"q": "deg"})
+    stream, whole = open_stream(given, folder=tmp_path, block=100), read_record(given, folder=tmp_path)
+    t, q, tau = (np.concatenate(x) for x in zip(*stream.blocks(), strict=True))
+    for found, expected in ((t, whole.t), (q, whole.q), (tau, whole.tau), (np.concatenate(list(stream.times())), whole.t)):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_scale_stored_in_the_file(tmp_path, samples):
+    given = settings(write("npz", tmp_path, samples), scale={"tau": "gain"})
+    _, _, tau = next(open_stream(given, folder=tmp_path, block=50).blocks())
+    np.testing.assert_array_equal(tau, 2 * samples[2][:50])
+
+
+@pytest.mark.parametrize(("kind", "place"), [("csv", "line 719"), ("npz", "sample 717"), ("npy", "sample 717"), ("parquet", "sample 717")])
+def test_what_is_not_finite_is_found_where_it_stands(tmp_path, samples, kind, place):
+    t, q, tau = samples
+    q = q.copy()
+    q[716, 1] = np.nan
+    stream = open_stream(settings(write(kind, tmp_path, (t, q, tau))), folder=tmp_path, block=100)
+    with pytest.raises(InputError, match=f"column '(q2|3)', {place}: nan"):
+        list(stream.blocks())
+
+
+@pytest.mark.parametrize("block", [10, 100, 2000])
+def test_clock(tmp_path, samples, block):
+    t, q, tau = samples
+    back, late = t.copy(), t.copy()
+    back[400] = back[399]
+    late[400:] += 0.5 / RATE
+    for bad, message in ((back, "sample 401: time goes from 0.798 s to 0.798 s"), (late, "sample 401: time is not uniform")):
+        given = settings(write("npz", tmp_path, (bad, q, tau)))
+        for read in (lambda given: open_stream(given, folder=tmp_path, block=block), lambda given: read_record(given, folder=tmp_path)):
+            with pytest.raises(InputError, match=message):
+                read(given)
+    with pytest.raises(InputError, match=r"time runs at 500 Hz, record\.rate is 400 Hz"):
+        open_stream(settings(write("npz", tmp_path, samples), rate=400, columns={"t": "t"}), folder=tmp_path, block=block)
+
+
+def test_bad_files(tmp_path, samples):
+    given = settings(write("npz", tmp_path, samples))
+    path = tmp_path / "record.npz"
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 255
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="damaged file of arrays"):
+        list(open_stream(given, folder=tmp_path, block=100).blocks())
+    path.write_bytes(data[:1000])
+    with pytest.raises(InputError, match="not an archive of plain arrays"):
+        open_stream(given, folder=tmp_path)
+    np.savez(path, q1=np.zeros(N), q2=np.zeros(N - 1), tau1=np.zeros(N), tau2=np.zeros(N))
+    with pytest.raises(InputError, match="columns of different lengths: q1 1003, q2 1002"):
+        open_stream(replace(given, rate=RATE), folder=tmp_path)
+    np.savez(path, q1=np.array([{}], dtype=object))
+    with pytest.raises(InputError, match="no columns q1"):
+        open_stream(replace(given, rate=RATE), folder=tmp_path)
+    with pytest.raises(InputError, match="no such file"):
+        open_stream(RecordSettings(files=("nothing.csv",)), folder=tmp_path)
+    with pytest.raises(InputError, match=r"\.mat files are read whole; convert to \.csv"):
+        open_stream(RecordSettings(files=("record.mat",)), folder=tmp_path)
+    with pytest.raises(InputError, match="uncompress it"):
+        open_stream(RecordSettings(files=("record.npy.gz",)), folder=tmp_path)
+    with pytest.raises(InputError, match="blocks of 3 samples"):
+        open_stream(given, folder=tmp_path, block=3)
+    (tmp_path / "record.parquet").write_bytes(b"PAR1 nothing")
+    with pytest.raises(InputError, match="not a Parquet file"):
+        open_stream(RecordSettings(files=("record.parquet",)), folder=tmp_path)
+
+
+def test_parquet_without_its_library(tmp_path, samples, monkeypatch):
+    write("parquet", tmp_path, samples)
+    monkeypatch.setitem(sys.modules, "polars", None)
+    for read in (open_stream, read_record):
+        with pytest.raises(InputError, match=r"pip install symgen\[tables\]"):
+            read(RecordSettings(files=("record.parquet",)), folder=tmp_path)
+
+
+def test_large_files(tmp_path, monkeypatch, samples):
+    given = settings(write("npz", tmp_path, samples))
+    assert not are_large([given], tmp_path)
+    monkeypatch.setattr("runtime.io.streams.LARGE", 10_000)
+    assert are_large([given], tmp_path)
+    assert not are_large([settings({"dataset": "tx40", "files": ["pos_read_data.csv"]})])
+    assert not are_large([RecordSettings(files=("record.mat",))], tmp_path)
+
+
+@pytest.fixture(scope="module")
+def tx40(tx40_data):
+    study = study_from_mapping(dataset_study("tx40"))
+    model = load_model(Path(__file__).parents[2] / "generated" / "tx40.py")
+    return model, study, read_records(study.record, model)[0]
+
+
+def same(found, expected):
+    """1e-10 of the largest, the goal; deviations and norms to 1e-9 of themselves."""
+    assert found.names == expected.names and found.rank == expected.rank
+    np.testing.assert_allclose(found.X, expected.X, rtol=0, atol=1e-10 * np.abs(expected.X).max())
+    for name in ("sigma", "sigma_corrected", "sigma_rho", "cond", "cond_unit", "residual_norm", "relative_error"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-9, err_msg=name)
+    for one, other in zip(found.per_joint, expected.per_joint, strict=True):
+        assert (one.joint, one.rows) == (other.joint, other.rows)
+        np.testing.assert_allclose(
+            (one.residual_norm, one.sigma_rho, one.scale), (other.residual_norm, other.sigma_rho, other.scale), rtol=1e-9
+        )
+
+
+@pytest.mark.parametrize("block", [777, 5000, 16384, 45000])
+def test_identification_of_the_tx40_by_blocks(tx40, block):
+    model, study, record = tx40
+    whole = observe(model, record, study)
+    reduction = reduce(model, [RecordStream(record, block)], study)
+    assert (reduction.rows, reduction.dropped, reduction.files) == (whole.rows, whole.dropped, whole.files)
+    expected, found = (essential(x, study.essential, study.estimate, model=model) for x in (whole, reduction))
+    same(found.all_parameters, expected.all_parameters)
+    same(found.estimate, expected.estimate)
+    assert [step.name for step in found.trail] == [step.name for step in expected.trail] and found.counts == expected.counts
+    validations = [split_validation(x, study.validate.split, study.estimate, essential=expected.names) for x in (whole, reduction)]
+    for one, other in zip(*(v.predictions for v in validations), strict=True):
+        assert (one.part, one.columns, one.fitted) == (other.part, other.columns, other.fitted)
+        np.testing.assert_allclose((one.relative_error, *one.per_joint), (other.relative_error, *other.per_joint), rtol=1e-8)
+    assert weak_directions(reduction, study.estimate).groups == weak_directions(whole, study.estimate).groups
+    np.testing.assert_allclose(reduction.shown.W, whole.W, atol=1e-10 * np.abs(whole.W).max())
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {
+            "rows": {"window": [0.51, 3.3], "low_speed": [0.1, 0.2, 0.05, 0.1, 0.3, 0.0]},
+            "signals": {"decimate": {"phase": "last", "padding": "matlab"}},
+        },
+        {"rows": {"window": [1, 2]}, "signals": {"median": 1, "decimate": None}},
+        {"rows": {"window": [1, 2], "trim": 40}, "signals": {"lowpass": {"on": ["qd"]}, "decimate": {"factor": 7}, "ends": "second-order"}},
+    ],
+    ids=["slow rows", "no decimation", "other filters"],
+)
+@pytest.mark.parametrize("estimator", [{}, {"method": "wls", "options": {"block": 0.2}}, {"method": "wls", "weights": "iterated"}])
+def test_settings_by_blocks(tx40, changed, estimator):
+    model, study, record = tx40
+    study = study_from_mapping({"estimate": estimator, **changed})
+    whole, reduction = observe(model, record, study), reduce(model, [RecordStream(record, 4001)], study)
+    assert (reduction.rows, reduction.dropped) == (whole.rows, whole.dropped)
+    same(*(estimate(x, study.estimate, model=model) for x in (reduction, whole)))
+
+
+def test_several_records_by_blocks(tx40):
+    model, study, record = tx40
+    study = replace(study, rows=replace(study.rows, window=(None, None), low_speed=0.05))
+    parts = [replace(record, t=record.t[s], q=record.q[s], tau=record.tau[s]) for s in (slice(0, 21000), slice(15000, 40000))]
+    whole = stack([observe(model, part, study) for part in parts])
+    reduction = reduce(model, [RecordStream(part, 6000) for part in parts], study)
+    assert (reduction.rows, reduction.dropped, reduction.files) == (whole.rows, whole.dropped, whole.files)
+    same(*(estimate(x, study.estimate, model=model) for x in (reduction, whole)))
+    assert reduction.windows == halves(float(whole.t.min()), float(whole.t.max())) or study.validate.split
+    one, other = (
+        cross_validation(x, {"first": y}, study.estimate).predictions[1]
+        for x, y in ((whole, observe(model, parts[0], study)), (reduction, reduce(model, [RecordStream(parts[0], 3000)], study)))
+    )
+    np.testing.assert_allclose((one.relative_error, *one.per_joint), (other.relative_error, *other.per_joint), rtol=1e-8)
+
+
+def test_what_needs_the_rows_is_refused(tx40):
+    model, study, record = tx40
+    short = replace(study, rows=replace(study.rows, window=(1.0, 2.0)), validate=replace(study.validate, split=((1.0, 1.5), (1.5, 2.0))))
+    reduction = reduce(model, [RecordStream(record, 5000)], short)
+    with pytest.raises(SettingsError, match="stream: off"):
+        estimate(reduction, EstimateSettings("wls", "covariance"))
+    with pytest.raises(InputError, match="cut by the windows"):
+        reduction.between(1.0, 1.7)
+    with pytest.raises(InputError, match=r"no sample in rows\.window"):
+        reduce(model, [RecordStream(record, 5000)], replace(study, rows=replace(study.rows, window=(20.0, 30.0))))
+    with pytest.raises(InputError, match=r"of which rows\.trim leaves out 200"):
+        reduce(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, trim=100)))
+    with pytest.raises(InputError, match="no row is left"):
+        reduce(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, low_speed=100.0)))
