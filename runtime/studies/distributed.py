@@ -7,8 +7,9 @@ thread in every task, and workers must have the versions of this process. Worker
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib.metadata import version
 from typing import Any, TypeVar
@@ -54,6 +55,8 @@ def _client(scheduler: str, timeout: float) -> Iterator[Any]:
     except ImportError as e:
         raise InputError("a Dask cluster needs an optional library: pip install symgen[scale]") from e
     with _answering(scheduler):
+        with ThreadPoolExecutor(1) as thread:  # an event loop of its own, wherever we are called from
+            thread.submit(asyncio.run, _shake_hands(scheduler, timeout)).result()
         client = Client(scheduler, timeout=timeout, set_as_default=False)
     try:
         with _answering(scheduler):
@@ -64,6 +67,14 @@ def _client(scheduler: str, timeout: float) -> Iterator[Any]:
         client.close()
 
 
+async def _shake_hands(scheduler: str, timeout: float) -> None:
+    """Connect once: something that listens and never answers would keep a Client waiting for ever."""
+    from distributed.comm import connect
+
+    comm = await asyncio.wait_for(connect(scheduler, timeout=timeout), timeout)
+    await comm.close()
+
+
 @contextmanager
 def _answering(scheduler: str) -> Iterator[None]:
     """Errors of a connection as one line."""
@@ -71,7 +82,7 @@ def _answering(scheduler: str) -> Iterator[None]:
         yield
     except (OSError, ValueError, RuntimeError, CancelledError) as e:  # TimeoutError and errors of communication are OSErrors
         raise InputError(
-            f"no answer from the scheduler {scheduler} or its workers: {str(e).partition(chr(10))[0] or type(e).__name__}"
+            f"no answer from the scheduler {scheduler} or its workers: {str(e).partition(chr(10))[0] or 'no reply in time'}"
         ) from e
 
 

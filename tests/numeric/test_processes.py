@@ -1,9 +1,15 @@
 """Tasks in this process and in others."""
 
 import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import pytest
 
+from runtime.errors import InputError
 from runtime.processes import BLAS_THREADS, results
 
 
@@ -15,6 +21,51 @@ def failing(context, key):
     if key == context:
         raise ValueError(f"key {key}")
     return key
+
+
+def dying_once(folder, key):
+    """The process of key 1 dies the first time."""
+    mark = folder / "died"
+    if key == 1 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return key
+
+
+def always_dying(context, key):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_dead_process_loses_nothing(tmp_path):
+    assert sorted(results(dying_once, tmp_path, range(4), 2)) == [0, 1, 2, 3]
+    assert (tmp_path / "died").exists()
+
+
+def test_processes_that_always_die():
+    with pytest.raises(InputError, match="died 3 times before any of 2 tasks"):
+        list(results(always_dying, None, range(2), 1))
+
+
+def test_processes_end_with_the_one_that_started_them(tmp_path):
+    """Killed, it cannot tell them to."""
+    code = "from runtime.processes import results\nimport sys, time, test_processes\nif __name__ == '__main__':\n" \
+           "    for pid in results(test_processes.waiting, None, [0.0, 60.0], 1):\n        print(pid, flush=True)\n"  # fmt: skip
+    script = tmp_path / "script.py"
+    script.write_text(code)
+    here = str(Path(__file__).parent)
+    process = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": here})
+    worker = int(process.stdout.readline())
+    process.kill()
+    process.communicate()
+    limit = time.monotonic() + 20
+    while Path(f"/proc/{worker}").exists() and time.monotonic() < limit:
+        time.sleep(0.05)
+    assert not Path(f"/proc/{worker}").exists()
+
+
+def waiting(context, key):
+    time.sleep(key)
+    return os.getpid()
 
 
 def test_here_in_order():

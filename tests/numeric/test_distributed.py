@@ -1,0 +1,115 @@
+"""A Dask cluster of two worker processes: the bits of one process, workers that die, schedulers that do not answer."""
+
+import os
+import signal
+import socket
+import sys
+from pathlib import Path
+
+import planar_2r_model as planar
+import pytest
+from planar_data import record
+
+from runtime.cestac import cestac
+from runtime.errors import InputError
+from runtime.studies.distributed import results
+from runtime.study import CestacSettings, Lowpass, Signals, Study
+
+dask = pytest.importorskip("distributed")
+
+RECORD = record(N=3000)
+STUDY = Study(signals=Signals(median=1, lowpass=Lowpass(cutoff=20)), cestac=CestacSettings(delta=(1e-3, 2e-3), runs=12, columns="all"))
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """Two processes on this machine, nothing on the network."""
+    with (
+        dask.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1") as local,
+        dask.Client(local) as client,
+    ):
+        client.register_plugin(SearchPath(str(Path(__file__).parent)))
+        yield local
+
+
+class SearchPath(dask.WorkerPlugin):
+    """Workers find the tasks of this file, also those that replace dead ones."""
+
+    name = "tests"
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def setup(self, worker):
+        sys.path.insert(0, self.folder)
+
+
+def dying_once(folder, key):
+    mark = folder / "died"
+    if key == 3 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return key, folder
+
+
+def failing(context, key):
+    if key == context:
+        raise ValueError(f"key {key}")
+    return key
+
+
+def test_same_bits_as_one_process(cluster):
+    here = cestac(planar, RECORD, STUDY)
+    calls = []
+    there = cestac(planar, RECORD, STUDY, scheduler=cluster.scheduler_address, progress=lambda done, total: calls.append((done, total)))
+    assert there.to_json() == here.to_json()
+    assert calls[-1] == (24, 24) and len(calls) == 8
+
+
+def test_a_worker_killed_halfway_changes_nothing(cluster):
+    killed = []
+
+    def kill_one(done, total):
+        if done >= total // 2 and not killed:
+            killed.append(next(iter(cluster.workers.values())).pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    there = cestac(planar, RECORD, STUDY, scheduler=cluster.scheduler_address, progress=kill_one)
+    assert killed and there.to_json() == cestac(planar, RECORD, STUDY).to_json()
+
+
+def test_a_dead_worker_loses_nothing(cluster, tmp_path):
+    found = sorted(results(dying_once, tmp_path, range(20), cluster.scheduler_address))
+    assert found == [(key, tmp_path) for key in range(20)]
+    assert (tmp_path / "died").exists()
+
+
+def test_a_failing_task_is_the_callers_error(cluster):
+    with pytest.raises(ValueError, match="key 2"):
+        list(results(failing, 2, range(5), cluster.scheduler_address))
+
+
+def test_no_scheduler():
+    with socket.socket() as listening:  # takes connections and never answers
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        port = listening.getsockname()[1]
+        with pytest.raises(InputError, match=f"no answer from the scheduler tcp://127.0.0.1:{port}"):
+            list(results(failing, None, range(2), f"tcp://127.0.0.1:{port}", timeout=0.5))
+    for address in (f"tcp://127.0.0.1:{port}", "127.0.0.1", "nonsense://1", " "):
+        with pytest.raises(InputError, match=f"no answer from the scheduler {address}"):
+            list(results(failing, None, range(2), address, timeout=0.5))
+
+
+def test_no_workers():
+    with (
+        dask.LocalCluster(n_workers=0, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1") as empty,
+        pytest.raises(InputError, match=r"no answer from the scheduler .* or its workers"),
+    ):
+        list(results(failing, None, range(2), empty.scheduler_address, timeout=0.5))
+
+
+def test_without_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install symgen\[scale\]"):
+        list(results(failing, None, range(2), "tcp://127.0.0.1:1"))
