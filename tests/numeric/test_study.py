@@ -50,7 +50,19 @@ def test_study_file_of_the_design():
 def test_written_settings_read_back(study):
     mapping = to_mapping(study)
     assert study_from_mapping(mapping) == study
-    assert set(mapping) == {"symgen", "record", "signals", "rows", "estimate", "essential", "validate", "cestac", "payload", "controller", "excitation"}
+    assert set(mapping) == {
+        "symgen",
+        "record",
+        "signals",
+        "rows",
+        "estimate",
+        "essential",
+        "validate",
+        "cestac",
+        "payload",
+        "controller",
+        "excitation",
+    }
     assert set(mapping["signals"]) == {"median", "lowpass", "ends", "decimate"}  # complete, defaults filled
 
 
