@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from itertools import groupby
 from typing import Any
@@ -26,7 +27,7 @@ from runtime.cestac_result import Cestac, Level, level_result
 from runtime.cestac_run import Part, Task, forget, observed, run_block
 from runtime.checkpoint import Checkpoint
 from runtime.drives import Drives
-from runtime.errors import SettingsError
+from runtime.errors import InputError, SettingsError
 from runtime.essential import essential
 from runtime.estimators import linear_system
 from runtime.estimators.linear import assemble
@@ -38,7 +39,8 @@ from runtime.record import Record
 from runtime.runs import Runs
 from runtime.signals import filtered_states
 from runtime.studies import distributed, fused_cestac
-from runtime.studies.compiled import CompiledModel
+from runtime.studies.compile_cache import processor
+from runtime.studies.compiled import CompiledModel, target_of
 from runtime.study import CestacSettings, Study, to_mapping
 
 Array = np.ndarray
@@ -59,6 +61,7 @@ def cestac(
     constants: Mapping[str, float] | None = None,
     workers: int = 0,
     scheduler: str | None = None,
+    device: Device | None = None,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     provenance: Mapping[str, Any] | None = None,
@@ -74,6 +77,7 @@ def cestac(
     workers : processes, 0 for this one (`runtime.processes`); the results do not depend on it. A script that asks for processes needs the usual
         `if __name__ == "__main__"`.
     scheduler : address of a Dask cluster that works instead (`runtime.studies.distributed`), with the same results.
+    device : arrays that work instead, in this process (`runtime.studies.device`), with the same results to rounding.
     progress : called with the number of runs done and their total.
     checkpoint : where runs are kept while the study lasts; those of an interrupted or shorter study with the same settings are not repeated.
     """
@@ -84,6 +88,8 @@ def cestac(
         raise SettingsError(
             f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("cestac", "side")
         )
+    if device is not None and (workers or scheduler):
+        raise InputError("a device works in this process; leave out workers and scheduler")
     names = _columns(model, records, study, columns, constants)
     task = Task(
         parts=tuple(_part(record, study) for record in records),
@@ -103,17 +109,17 @@ def cestac(
         "estimate": to_mapping(study.estimate),
         "cestac": to_mapping(settings),
         "rate": [record.rate for record in records],
-        "target": "c" if isinstance(model, CompiledModel) else "numpy",
+        "target": target_of(model),
         "torque_side": "joint" if drives is None else "motor",
     }
     finished = checkpoint.resume(_identity(task, described, reference.provenance), len(names)) if checkpoint else Runs.of((), len(names))
-    runs = _all_runs(task, finished, workers, scheduler, progress, checkpoint)
+    runs = _all_runs(task, finished, partial(_results, task, workers, scheduler, device), progress, checkpoint)
     return Cestac(
         names=names,
         reference=reference,
         levels=tuple(level_result(level, runs.where(runs.level == k), seen, reference) for k, level in enumerate(task.levels)),
         settings=described,
-        provenance={**reference.provenance, "seed": settings.seed},
+        provenance={**reference.provenance, "seed": settings.seed, "processor": processor()},
     )
 
 
@@ -137,7 +143,11 @@ def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> lis
 
 
 def _all_runs(
-    task: Task, finished: Runs, workers: int, scheduler: str | None, progress: Progress | None, checkpoint: Checkpoint | None
+    task: Task,
+    finished: Runs,
+    compute: Callable[[Sequence[tuple[Key, ...]]], Iterator[Runs]],
+    progress: Progress | None,
+    checkpoint: Checkpoint | None,
 ) -> Runs:
     """Every run, by level and number, in whatever order they finished."""
     runs, b = task.settings.runs, len(task.names)
@@ -146,7 +156,7 @@ def _all_runs(
     known = parts[0].keys
     missing = [key for level in range(len(task.levels)) for run in range(runs) if (key := (level, run)) not in known]
     try:
-        for part in _results(task, key_blocks(missing, runs, len(task.levels), task.settings.common), workers, scheduler):
+        for part in compute(key_blocks(missing, runs, len(task.levels), task.settings.common)):
             parts.append(part)
             done += len(part)
             if checkpoint is not None:
@@ -161,8 +171,10 @@ def _all_runs(
     return Runs.joined(parts, b)
 
 
-def _results(task: Task, blocks: Sequence[tuple[Key, ...]], workers: int, scheduler: str | None) -> Iterator[Runs]:
-    """Blocks of runs, from this process, several, or a cluster."""
+def _results(task: Task, workers: int, scheduler: str | None, device: Device | None, blocks: Sequence[tuple[Key, ...]]) -> Iterator[Runs]:
+    """Blocks of runs, from this process, several, a cluster or a device."""
+    if device is not None:
+        return device(task, blocks)
     in_c = isinstance(task.model, CompiledModel)
     run = fused_cestac.run_block if in_c else run_block
     if not blocks or not (workers or scheduler):

@@ -101,9 +101,18 @@ def compiler() -> tuple[tuple[str, ...], str]:
     return command, done.stdout
 
 
+def processor() -> str:
+    """Machine and name of the processor, as far as the system tells: what results depend on in their last bits."""
+    return f"{platform.machine()} {_cpuinfo('model name').partition(':')[2].strip() or platform.processor()}".strip()
+
+
 def _processor() -> str:
     """What the code may depend on: machine, system, processor flags."""
+    return f"{platform.system()} {platform.machine()} {platform.architecture()[0]} {_cpuinfo('flags', 'Features')}"
+
+
+def _cpuinfo(*starts: str) -> str:
+    """First line about the processor that starts so; empty where the system has none."""
     info = Path("/proc/cpuinfo")
     text = info.read_text(errors="replace") if info.is_file() else platform.processor()
-    flags = next((line for line in text.splitlines() if line.startswith(("flags", "Features"))), "")
-    return f"{platform.system()} {platform.machine()} {platform.architecture()[0]} {flags}"
+    return next((line for line in text.splitlines() if line.startswith(starts)), "")

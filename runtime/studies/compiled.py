@@ -62,6 +62,11 @@ def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: 
         return model
 
 
+def target_of(model: GeneratedModel) -> str:
+    """What computes: "c" for a compiled model, "numpy" for an emitted module."""
+    return "c" if isinstance(model, CompiledModel) else "numpy"
+
+
 @dataclass(frozen=True)
 class Signals:
     """The distinct rows of the store S, shape (b, n, N), as a C function, for other C code: S[column, row] = sign U[signal].

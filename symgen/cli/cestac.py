@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from symgen.cli.session import NEGATIVE, opened_model, origin, reported_errors, single_thread, study_and_records, study_text
+from symgen.cli.session import NEGATIVE, in_target, opened_model, origin, reported_errors, single_thread, study_and_records, study_text
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ def cestac(
             "--advise", help="Predict the coarsest steps that keep the change below 1 % and 5 %, and confirm them by --runs runs each."
         ),
     ] = False,
+    target: Annotated[str, typer.Option(help="numpy, or c: compiled runs, about six times as many a second.")] = "numpy",
     json: Annotated[bool, typer.Option("--json", help="Print cestac.json (advice.json) instead of tables.")] = False,
 ) -> None:
     """Study the encoder resolution. Exit code 1 where least squares is biased at one of the steps.
@@ -66,6 +67,7 @@ def cestac(
             asked = study.cestac.delta if delta else ()
             raise typer.Exit(NEGATIVE if advised(model, study, folder, records, asked, output, json) else 0)
         checkpoint = None if output is None else Checkpoint(output)
+        model = in_target(robot, model, target)
         with progress_bar() as progress, kept_runs(checkpoint):
             result = study_of_resolution.cestac(
                 model,

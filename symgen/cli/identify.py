@@ -10,6 +10,7 @@ import typer
 from symgen.cli.session import (
     NEGATIVE,
     SIMULATED_WARNING,
+    in_target,
     opened_model,
     origin,
     reported_errors,
@@ -30,6 +31,7 @@ def identify(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for report.html, estimate.json, figures, tables, study.yaml.")
     ] = None,
+    target: Annotated[str, typer.Option(help="numpy, or c: the regressor compiled.")] = "numpy",
     json: Annotated[bool, typer.Option("--json", help="Print estimate.json instead of tables.")] = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD. Exit code 1 where the record does not determine them."""
@@ -37,10 +39,14 @@ def identify(
     with reported_errors(), opened_model(robot) as model:
         from runtime.identification import identification
         from runtime.io.records import read_records
+        from runtime.studies.compile_cache import processor
+        from runtime.studies.compiled import target_of
 
         study, folder, records = study_and_records(record, model)
         further = read_records(study.validate.record, model, folder=folder)
-        found = identification(model, study, records, further=further, provenance=origin(records))
+        model = in_target(robot, model, target)
+        computed = {"target": target_of(model), "processor": processor()}
+        found = identification(model, study, records, further=further, provenance={**origin(records), **computed})
         if output is not None:
             write_all(output, identification_files(found, study_text(study, folder, output)))
         typer.echo(estimate_json(found) if json else console_text(found), nl=not json)

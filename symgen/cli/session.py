@@ -79,6 +79,32 @@ def opened_model(robot: str) -> Iterator[GeneratedModel]:
         yield load_model(path)
 
 
+def in_target(robot: str, model: GeneratedModel, target: str) -> GeneratedModel:
+    """`model` or, for target "c", the same in C, inside the block of `opened_model`: one line says why where NumPy serves instead."""
+    import warnings
+
+    from runtime.studies.compiled import compiled_model
+    from runtime.studies.fused_cestac import usable
+
+    if target not in ("numpy", "c"):
+        fail(f"--target {target}; expected numpy or c")
+    if target == "numpy":
+        return model
+    path = Path(str(getattr(model, "__file__", ""))).with_suffix(".c")
+    if Path(robot).suffix != ".py":
+        from symgen.description import load_robot
+        from symgen.emit import generate_files
+
+        for text in generate_files(load_robot(robot), targets=("c",)).values():
+            path.write_text(text, encoding="utf-8")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = usable(compiled_model(model))
+    for warning in said:
+        typer.echo(str(warning.message), err=True)
+    return found
+
+
 def symbolic_file(robot: str, model: GeneratedModel) -> Path:
     """The CasADi module of `robot`, inside the block of `opened_model`: beside a generated module, else emitted beside `model`."""
     from runtime.errors import ModelError
