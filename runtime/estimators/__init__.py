@@ -2,6 +2,7 @@
 
 ols   ordinary least squares               runtime/estimators/ols.py
 wls   least squares weighted by joint      runtime/estimators/wls.py
+irls  robust least squares, Huber or Tukey    runtime/estimators/irls.py
 feasible  least squares among physical robots, extra consistency    runtime/estimators/feasible.py
 """
 
@@ -13,7 +14,7 @@ from typing import Any, Protocol, TypeVar
 
 from runtime.errors import SettingsError
 from runtime.estimate import Estimate
-from runtime.estimators import feasible, ols, wls
+from runtime.estimators import feasible, irls, ols, wls
 from runtime.estimators.linear import System, assemble
 from runtime.estimators.reduction import Reduction
 from runtime.model import GeneratedModel
@@ -66,7 +67,7 @@ def linear_estimate(
     return assemble(system, system.solve(), model=model, provenance=provenance)
 
 
-METHODS: Mapping[str, Estimator] = {**dict.fromkeys(LINEAR, linear_estimate), "feasible": feasible.feasible}
+METHODS: Mapping[str, Estimator] = {**dict.fromkeys(LINEAR, linear_estimate), "feasible": feasible.feasible, "irls": irls.irls}
 """Every method, by the name that `estimate.method` of a study gives it."""
 
 

@@ -60,7 +60,7 @@ def _first_scales(raw: Factor, tolerance: float | None) -> np.ndarray:
     """s_j from joint j alone; from the common ordinary least squares where joint j has too few rows. Never zero."""
     common = _common_scales(raw, solve(raw, tolerance).X, tolerance)
     own = joint_scatter(raw, tolerance)
-    return _floored(raw, np.array([c if s is None else s for s, c in zip(own, common, strict=True)]))
+    return floored(raw, np.array([c if s is None else s for s, c in zip(own, common, strict=True)]))
 
 
 def _common_scales(raw: Factor, X: np.ndarray, tolerance: float | None) -> np.ndarray:
@@ -70,12 +70,12 @@ def _common_scales(raw: Factor, X: np.ndarray, tolerance: float | None) -> np.nd
     return np.array([joint.residual_norm(X) / np.sqrt(max(joint.rows, 1) * share) for joint in raw.joints])
 
 
-def _floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
+def floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
     """Scales not below EXACT times the rms of Y_j: an exact fit of a joint must not weigh infinitely."""
     rounding = [EXACT * joint.measured_norm / np.sqrt(max(joint.rows, 1)) for joint in raw.joints]
-    floored = np.maximum(scales, rounding)
-    smallest = floored[floored > 0].min(initial=np.inf)
-    return np.where(floored > 0, floored, smallest if np.isfinite(smallest) else 1.0)
+    least = np.maximum(scales, rounding)
+    smallest = least[least > 0].min(initial=np.inf)
+    return np.where(least > 0, least, smallest if np.isfinite(smallest) else 1.0)
 
 
 def _iterated(start: System) -> System:
@@ -83,7 +83,7 @@ def _iterated(start: System) -> System:
     limit = int(start.options.get("passes", PASSES))
     scales, change, done = np.array(start.scales), np.inf, 0
     while change >= CONVERGED and done < limit:
-        new = _floored(raw, _common_scales(raw, solve(raw.weighted(1 / scales), tolerance).X, tolerance))
+        new = floored(raw, _common_scales(raw, solve(raw.weighted(1 / scales), tolerance).X, tolerance))
         change = float(np.max(np.abs(new / scales - 1)))
         scales, done = new, done + 1
     status, message = "ok", ""
