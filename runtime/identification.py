@@ -18,9 +18,12 @@ from runtime.drives import Coupling, Drives
 from runtime.essential import Essential, essential
 from runtime.estimate import Estimate
 from runtime.estimators import LINEAR, estimate, linear_companion, point_estimate
+from runtime.estimators.reduction import Reduction, Window
 from runtime.model import GeneratedModel
 from runtime.observation import Observation, observe, stack
 from runtime.record import Record
+from runtime.record_stream import ChangedStream, Stream
+from runtime.streaming import halves, reduce
 from runtime.study import Study
 from runtime.validation import (
     Comparison,
@@ -31,6 +34,8 @@ from runtime.validation import (
     split_validation,
     weak_directions,
 )
+
+Array = np.ndarray
 
 COUPLINGS: tuple[Coupling, ...] = ("both", "position", "torque", "none")
 
@@ -47,8 +52,8 @@ class Identification:
 
     model: GeneratedModel
     study: Study
-    records: tuple[Record, ...]
-    observation: Observation
+    records: tuple[Record | Stream, ...]
+    observation: Observation | Reduction
     found: Essential
     chosen: Estimate
     comparison: Comparison
@@ -123,23 +128,24 @@ class Identification:
 def identification(
     model: GeneratedModel,
     study: Study,
-    records: Sequence[Record],
+    records: Sequence[Record | Stream],
     *,
-    further: Sequence[Record] = (),
+    further: Sequence[Record | Stream] = (),
     provenance: Mapping[str, Any] | None = None,
 ) -> Identification:
     """Identify by the settings of `study`.
 
-    records : joint side, as read by study.record.   further : those of study.validate.record, predicted with the parameters found.
+    records : joint side, as read by study.record, in memory or by blocks.
+    further : those of study.validate.record, predicted with the parameters found.
     """
-    observation = stack([observe(model, record, study) for record in records])
+    observation = observed(model, records, study)
     found = essential(observation, study.essential, linear_companion(study.estimate), model=model, provenance=provenance)
     linear = study.estimate.method in LINEAR
     chosen = found.all_parameters if linear else estimate(observation, study.estimate, model=model, provenance=provenance)
-    windows = study.validate.split or halves(observation)
+    windows = study.validate.split or halves(*observation.span)
     validation = [split_validation(observation, windows, study.estimate, essential=found.names, model=model)]
     if further:
-        seen = {record.name: observe(model, record, study) for record in further}
+        seen = {record.name: observed(model, [record], study, windows=()) for record in further}
         name = ", ".join(record.name for record in records)
         validation.append(cross_validation(observation, seen, study.estimate, essential=found.names, name=name, model=model))
     return Identification(
@@ -149,21 +155,26 @@ def identification(
         observation=observation,
         found=found,
         chosen=chosen,
-        comparison=direct_comparison(observation, found.estimate if linear else chosen),
+        comparison=direct_comparison(
+            observation if isinstance(observation, Observation) else observation.shown, found.estimate if linear else chosen
+        ),
         validation=tuple(validation),
         weak=weak_directions(observation, study.estimate),
         coupling=coupling_fits(model, study, records),
     )
 
 
-def halves(observation: Observation) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The two halves in time of the rows used, s."""
-    t0, t1 = float(observation.t.min()), float(observation.t.max())
-    middle = (t0 + t1) / 2
-    return (t0, middle), (float(np.nextafter(middle, t1)), t1)
+def observed(
+    model: GeneratedModel, records: Sequence[Record | Stream], study: Study, *, windows: Sequence[Window] | None = None
+) -> Observation | Reduction:
+    """The rows of the records, or what is left of them where they are read by blocks; windows : as in `streaming.reduce`."""
+    in_memory = [record for record in records if isinstance(record, Record)]
+    if in_memory:
+        return stack([observe(model, record, study) for record in in_memory])
+    return reduce(model, [record for record in records if not isinstance(record, Record)], study, windows=windows)
 
 
-def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record]) -> dict[Coupling, Estimate]:
+def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record | Stream]) -> dict[Coupling, Estimate]:
     """Fits of all parameters with the coupling of the drives in position and torque, in one, or in none; motor-side records only."""
     if model.DRIVES is None or any(settings.side != "motor" for settings in study.record) or len(records) != len(study.record):
         return {}
@@ -174,11 +185,17 @@ def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record]
     for coupling in COUPLINGS:
         pairs = zip(records, study.record, strict=True)
         changed = [recoupled(record, drives.decoupled(settings.coupling), drives.decoupled(coupling)) for record, settings in pairs]
-        fits[coupling] = estimate(stack([observe(model, record, study) for record in changed]), point_estimate(study.estimate), model=model)
+        fits[coupling] = estimate(observed(model, changed, study, windows=()), point_estimate(study.estimate), model=model)
     return fits
 
 
-def recoupled(record: Record, used: Drives, wanted: Drives) -> Record:
+def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record | Stream:
     """The record as the drives `wanted` would have turned its motor side into the joint side; `used` are those it was read with."""
-    q = wanted.joint_position(used.motor_position(record.q))
-    return replace(record, q=q, tau=wanted.joint_torque(used.motor_command(record.tau)))
+
+    def change(q: Array, tau: Array) -> tuple[Array, Array]:
+        return wanted.joint_position(used.motor_position(q)), wanted.joint_torque(used.motor_command(tau))
+
+    if not isinstance(record, Record):
+        return ChangedStream(record, change)
+    q, tau = change(record.q, record.tau)
+    return replace(record, q=q, tau=tau)

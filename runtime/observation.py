@@ -72,6 +72,11 @@ class Observation:
         """Joint of each row, from 0, shape (r,)."""
         return np.repeat(np.arange(self.n), self.rows)
 
+    @property
+    def span(self) -> tuple[float, float]:
+        """Time of the first and of the last row, s."""
+        return float(self.t.min()), float(self.t.max())
+
     def joint(self, j: int) -> slice:
         """Rows of the j-th joint, j from 0."""
         start = sum(self.rows[:j])

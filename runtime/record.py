@@ -12,10 +12,9 @@ from types import MappingProxyType
 import numpy as np
 
 from runtime.errors import InputError
+from runtime.study import SHORTEST
 
 Array = np.ndarray
-
-SHORTEST = 10  # samples: fewer cannot be filtered nor differentiated twice
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,10 +16,25 @@ Array = np.ndarray
 class Stream(Protocol):
     """A record that is read by blocks, joint side, SI, as often as asked."""
 
-    name: str
-    n: int
-    rate: float
-    files: Mapping[str, str]
+    @property
+    def name(self) -> str:
+        """Name of the record."""
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz."""
+
+    @property
+    def files(self) -> Mapping[str, str]:
+        """SHA-256 by file name."""
+
+    @property
+    def block(self) -> int:
+        """Samples of a block."""
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -70,6 +85,51 @@ class RecordStream:
         for a in range(0, len(self), self.block):
             samples = slice(a, a + self.block)
             yield self.record.t[samples], self.record.q[samples], self.record.tau[samples]
+
+
+@dataclass(frozen=True, eq=False)
+class ChangedStream:
+    """A stream whose positions and torques are changed, sample by sample: change(q, tau) of arrays (B, n)."""
+
+    stream: Stream
+    change: Callable[[Array, Array], tuple[Array, Array]]
+
+    @property
+    def name(self) -> str:
+        """Name of the record."""
+        return self.stream.name
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.stream.n
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz."""
+        return self.stream.rate
+
+    @property
+    def files(self) -> Mapping[str, str]:
+        """SHA-256 by file name."""
+        return self.stream.files
+
+    @property
+    def block(self) -> int:
+        """Samples of a block."""
+        return self.stream.block
+
+    def __len__(self) -> int:
+        return len(self.stream)
+
+    def times(self) -> Iterator[Array]:
+        """Time of the samples, s, by blocks."""
+        return self.stream.times()
+
+    def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
+        """t, q, tau by blocks."""
+        for t, q, tau in self.stream.blocks():
+            yield t, *self.change(q, tau)
 
 
 class Queue:

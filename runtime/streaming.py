@@ -94,7 +94,7 @@ def reduce(
         residual_block=length,
         shown=several,
         dropped={reason: tuple(np.sum([at.dropped[reason] for at in layouts], axis=0).tolist()) for reason in layouts[0].dropped},
-        settings=several.settings,
+        settings={**several.settings, "stream": {"block": max(stream.block for stream in streams)}},
         files=all_files([stream.files for stream in streams]),
     )
 

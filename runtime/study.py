@@ -22,6 +22,7 @@ from runtime.excitation_settings import ExcitationSettings
 from runtime.mapping import plain, structure
 
 SCHEMA = 1
+SHORTEST = 10  # samples of a record, or of a block of one: fewer cannot be filtered nor differentiated twice
 
 PositionUnit = Literal["rad", "deg", "rev", "counts", "m", "mm"]
 TorqueUnit = Literal["N*m", "N", "A", "V"]
@@ -252,7 +253,10 @@ class CestacSettings:
 @dataclass(frozen=True)
 class Study:
     """All settings. `record` holds one or several records of one robot; `controller`: the closed loop of simulation, IV,
-    DIDIM and CLOE; `payload`: records with a load; `excitation`: the search for a motion."""
+    DIDIM and CLOE; `payload`: records with a load; `excitation`: the search for a motion.
+
+    stream : samples of the blocks by which `identify` reads the records; "auto": blocks for large files, "off": whole records.
+    """
 
     symgen: int = SCHEMA
     record: tuple[RecordSettings, ...] = ()
@@ -265,9 +269,12 @@ class Study:
     payload: PayloadSettings | None = None
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
+    stream: Literal["auto", "off"] | int = "auto"
 
     def __post_init__(self) -> None:
         _require(self.symgen == SCHEMA, ("symgen",), f"schema {self.symgen}; this version reads {SCHEMA}")
+        blocks = self.stream if isinstance(self.stream, int) else SHORTEST
+        _require(blocks >= SHORTEST, ("stream",), f"{blocks}; expected auto, off, or samples of a block, {SHORTEST} or more")
 
 
 def study_from_mapping(mapping: Mapping[str, Any]) -> Study:

@@ -22,8 +22,7 @@ from runtime.io.records import file_hashes, record_files
 from runtime.io.table import BLOCK_READERS, BlockTable, open_table
 from runtime.io.timing import SECONDS, clock
 from runtime.model import GeneratedModel
-from runtime.record import SHORTEST
-from runtime.study import Columns, RecordSettings
+from runtime.study import SHORTEST, Columns, RecordSettings
 
 Array = np.ndarray
 

@@ -60,6 +60,7 @@ def test_written_settings_read_back(study):
         "validate",
         "cestac",
         "payload",
+        "stream",
         "controller",
         "excitation",
     }
@@ -187,3 +188,10 @@ def test_arithmetic(text, value):
 def test_arithmetic_refuses(text):
     with pytest.raises(ValueError, match=r"number|value|allowed"):
         number(text)
+
+
+def test_blocks_of_the_records():
+    assert [study_from_mapping({"stream": value}).stream for value in ("auto", "off", 5000)] == ["auto", "off", 5000]
+    for value in (9, "always", 0.5):
+        with pytest.raises(SettingsError, match="stream: .*expected auto"):
+            study_from_mapping({"stream": value})
