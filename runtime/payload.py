@@ -87,7 +87,7 @@ def payload(
     if not without or not loaded:
         raise InputError("a payload needs a record without it and one with it (record, payload.record)")
     physical = physical_model(model)
-    link, unknown, columns, chi_known = _load(physical, settings)
+    link, unknown, columns, chi_known = carried(physical, settings)
     friction = friction_columns(model, physical) if settings.friction else []
     names = (*model.BASE_PARAMETERS, *(f"{family}{LOAD}" for family in unknown), *(model.BASE_PARAMETERS[k] + LOAD for k in friction))
 
@@ -109,7 +109,7 @@ def payload(
 def payload_difference(model: GeneratedModel, without: Estimate, loaded: Estimate, settings: PayloadSettings) -> Payload:
     """The load from two estimates of all base parameters, weighted by the inverse of C_a + C_b."""
     physical = physical_model(model)
-    link, unknown, columns, chi_known = _load(physical, settings)
+    link, unknown, columns, chi_known = carried(physical, settings)
     for fit in (without, loaded):
         if fit.names != physical.base or not np.isfinite(fit.covariance).all():
             raise InputError("the difference needs estimates of all base parameters of the model, each with a full covariance")
@@ -129,7 +129,7 @@ def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int
     return [k for k, row in enumerate(physical.K) if not row[~friction].any()]
 
 
-def _load(physical: PhysicalModel, settings: PayloadSettings) -> tuple[int, tuple[str, ...], list[int], Array]:
+def carried(physical: PhysicalModel, settings: PayloadSettings) -> tuple[int, tuple[str, ...], list[int], Array]:
     """Link, unknown families with an effect, their columns of K, and the known standard parameters, shape (p,)."""
     link = physical.links[-1] if settings.link is None else settings.link
     if link not in physical.links:
