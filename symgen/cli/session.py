@@ -16,6 +16,7 @@ import typer
 if TYPE_CHECKING:
     from runtime.model import GeneratedModel
     from runtime.record import Record
+    from runtime.record_stream import Stream
     from runtime.study import Study
 
 BAD_INPUT, NEGATIVE = 2, 1
@@ -124,17 +125,24 @@ def symbolic_file(robot: str, model: GeneratedModel) -> Path:
 
 def study_and_records(record: str, model: GeneratedModel) -> tuple[Study, Path, list[Record]]:
     """The study a RECORD argument means, the folder of its files, and its records."""
-    from runtime.errors import InputError
     from runtime.io.records import read_records
+
+    study, folder = study_with_record(record)
+    return study, folder, read_records(study.record, model, folder=folder)
+
+
+def study_with_record(record: str) -> tuple[Study, Path]:
+    """The study a RECORD argument means, which names a record, and the folder of its files."""
+    from runtime.errors import InputError
     from runtime.io.study_files import study_of
 
     study, folder = study_of(record)
     if not study.record:
         raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=record)
-    return study, folder, read_records(study.record, model, folder=folder)
+    return study, folder
 
 
-def origin(records: Sequence[Record]) -> dict[str, Any]:
+def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
     """Provenance of the records: their names, and whether they were simulated."""
     simulated = any(record.name.startswith(SIMULATED) for record in records)
     note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
@@ -155,6 +163,8 @@ def study_text(study: Study, folder: Path, destination: Path) -> str:
 
     record, further = tuple(moved(s) for s in study.record), tuple(moved(s) for s in study.validate.record)
     complete = replace(study, record=record, validate=replace(study.validate, record=further))
+    if study.payload is not None:
+        complete = replace(complete, payload=replace(study.payload, record=tuple(moved(s) for s in study.payload.record)))
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False
