@@ -41,6 +41,7 @@ from runtime.signals import filtered_states
 from runtime.studies import distributed, fused_cestac
 from runtime.studies.compile_cache import processor
 from runtime.studies.compiled import CompiledModel, target_of
+from runtime.studies.device import Device
 from runtime.study import CestacSettings, Study, to_mapping
 
 Array = np.ndarray
@@ -109,7 +110,7 @@ def cestac(
         "estimate": to_mapping(study.estimate),
         "cestac": to_mapping(settings),
         "rate": [record.rate for record in records],
-        "target": target_of(model),
+        "target": device.name if device else target_of(model),
         "torque_side": "joint" if drives is None else "motor",
     }
     finished = checkpoint.resume(_identity(task, described, reference.provenance), len(names)) if checkpoint else Runs.of((), len(names))
