@@ -27,6 +27,7 @@ DRAWS = 12  # random motions in which the columns of the regressor are looked at
 REST = 1e-9  # rad/s or m/s: slower is at rest
 PIVOTS = 5  # block pivots
 EQUAL = 1e-9  # relative; keeps the forces of redundant elements apart
+SLACK = 1e-6  # of the acceleration that dry friction gives: an element that starts slower may as well rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +98,8 @@ def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
         if last:
             break
         leaving = held * ((f > plus) - (f < -minus))
-        rate = free - D @ f
-        mode = leaving + mode * (mode * rate >= -REST)
+        rate, slack = free - D @ f, SLACK * ca.diag(D) * (plus + minus)
+        mode = leaving + mode * (mode * rate >= -slack)
     return resting * ca.fmin(ca.fmax(f, -ca.fmax(minus, 0)), ca.fmax(plus, 0)), mode
 
 
@@ -108,7 +109,10 @@ def _masked(D: SX, rows: SX) -> SX:
 
 
 def rest_function(friction: DryFriction) -> Any:
-    """(qd, Y, at_rest) -> qd with the slips marked 1 at zero: the nearest velocity in the metric of A, so that kinetic energy only falls."""
+    """(qd, Y, at_rest) -> qd with the slips marked 1 at zero: the nearest velocity in the metric of A, so that kinetic energy only falls.
+
+    Of a displacement in place of qd: elements that rest over the step do not creep.
+    """
     m, n = friction.G.shape
     qd, Y, rows = ca.SX.sym("qd", n), ca.SX.sym("Y", n, m), ca.SX.sym("rows", m)
     G = ca.DM(friction.G)

@@ -117,7 +117,7 @@ def _rounds(model: SymbolicModel, friction: DryFriction, constants: dict[str, fl
         f, direction, qdd, Y = force(q, qd, tau, X, plus, minus)
         q1, qd1, _ = flow(q, qd, tau - ca.DM(friction.G).T @ f, X, h)
         qx, qdx, left, at_rest = event(q, qd, qdd, q1, qd1, h, direction, whole)
-        return [qx, rest(qdx, Y, at_rest), left, qdd]
+        return [q + rest(qx - q, Y, direction == 0), rest(qdx, Y, at_rest), left, qdd]
 
     # a switch gives only what is used: in C, CasADi crashes on a result of one that nobody takes
     q, qd, *fixed, h = inputs

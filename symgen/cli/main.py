@@ -16,6 +16,7 @@ VERBS = {
     "identify": "Estimate the base parameters from a measured record.",
     "cestac": "Judge whether the encoder resolves enough for an identification.",
     "excite": "Search a motion that excites the parameters within the limits.",
+    "simulate": "Simulate the closed loop of a study file and write its record.",
     "datasets": "List the measured records this program knows, and where they lie.",
     "new": "Write a skeleton robot file.",
     "demo": "The main job end to end, with a report.",
