@@ -155,9 +155,9 @@ def test_runs_that_need_the_triangular_factor_are_solved_on_the_host(planar):
     q, tau = still.q.copy(), still.tau.copy()
     q[:, 1] = 0.3  # joint 2 at rest: several columns are equal
     at_rest = replace(still, q=q, tau=tau)
-    asked = study(delta=(1e-7,))
+    asked = study(delta=(1e-9,))
     found = cestac(model, at_rest, asked, device=Device(arrays, np.zeros(1)))
-    agree(found, cestac(model, at_rest, asked), tolerance=1e-5)  # rounding times a condition number of 1e8 and more
+    agree(found, cestac(model, at_rest, asked), tolerance=1e-4)  # q + Delta keeps 7 digits of such a Delta
     assert {run.method for level in found.levels for run in level.runs} == {"triangular factor"}
 
 
