@@ -5,8 +5,10 @@ size of their parameter, so that parameters are compared by their relative error
 
     W_w = diag(1/s_j) W diag(|X_i|)       cond      s_max/s_min of W_w
                                           logdet    -log det W_w'W_w
-                                          sigma     largest %sigma_i, the root of the diagonal of (W_w'W_w)^-1
-    C = (sum_j W_j'W_j/s_j^2)^-1          predicted covariance, residuals taken as white at the decimated rate
+                                          sigma     largest %sigma_i, the root of the diagonal of C
+    C = A W_w'Omega W_w A, A = (W_w'W_w)^-1       predicted covariance of X_i/|X_i|
+
+Omega is what the decimation makes of white torque noise: neighbouring rows are correlated, which costs a tenth of the precision or more.
 
 W is that of the identification: the motion, sampled at the controller rate, goes through the filters and the decimation of the study.
 Parameters smaller than a hundredth of the largest of their unit count as if they had that size. `runtime.studies.excitation` searches the motion.
@@ -20,12 +22,14 @@ from typing import Any
 
 import numpy as np
 
+from runtime.bandwidth import bandwidth
 from runtime.errors import InputError, SettingsError
 from runtime.excitation_settings import ExcitationSettings
 from runtime.model import GeneratedModel, require
 from runtime.observation import Observation, observe
 from runtime.record import Record
-from runtime.study import Study
+from runtime.signals import decimation_factor
+from runtime.study import Signals, Study
 from runtime.trajectories import Motion
 
 Array = np.ndarray
@@ -66,10 +70,24 @@ class Weights:
         values = np.linalg.svd(np.linalg.qr(self.matrix(seen), mode="r"), compute_uv=False)
         return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
 
-    def relative_sigma(self, seen: Observation) -> Array:
-        """Predicted %sigma of the parameters, shape (c,), of their size."""
-        R = np.linalg.qr(self.matrix(seen), mode="r")
-        return np.asarray(100 * np.linalg.norm(np.linalg.solve(R, np.eye(len(R))), axis=1))
+    def relative_sigma(self, seen: Observation, correlation: Sequence[float] | Array = (1.0,)) -> Array:
+        """Predicted %sigma of the parameters, shape (c,), of their size.
+
+        correlation : of the torque noise of a joint between rows 0, 1, 2 ... sampling periods apart (`kept_correlation`).
+        """
+        W = self.matrix(seen)
+        inverse = np.linalg.inv(np.linalg.qr(W, mode="r"))
+        spread = np.zeros((W.shape[1], W.shape[1]))  # W' Omega W
+        for j in range(seen.n):
+            at = np.rint((seen.t[seen.joint(j)] - seen.t.min()) * seen.rate).astype(int)
+            rows = np.zeros((at.max(initial=0) + 1, W.shape[1]))
+            rows[at] = W[seen.joint(j)]
+            spread += correlation[0] * rows.T @ rows
+            for k, r in enumerate(correlation[1:], start=1):
+                shifted = rows[:-k].T @ rows[k:]
+                spread += r * (shifted + shifted.T)
+        C = inverse @ inverse.T @ spread @ inverse @ inverse.T
+        return np.asarray(100 * np.sqrt(np.diag(C)))
 
 
 @dataclass(frozen=True)
@@ -138,9 +156,16 @@ def criterion_of(weights: Weights, seen: Observation, criterion: str) -> float:
     """The criterion on the rows of the identification, exact; smaller is better."""
     if criterion == "cond":
         return weights.condition(seen)
-    if criterion == "sigma":
+    if criterion == "sigma":  # white residuals: the order of candidates does not depend on it
         return float(weights.relative_sigma(seen).max())
     return float(-2 * np.sum(np.log(np.abs(np.diag(np.linalg.qr(weights.matrix(seen), mode="r"))))))
+
+
+def kept_correlation(signals: Signals, rate: float) -> Array:
+    """Correlation that the decimation leaves between rows 0, 1, 2 ... kept samples apart where the torque noise is white at `rate`, Hz."""
+    factor = decimation_factor(signals, rate)
+    kept = bandwidth(replace(signals, median=1), rate).decimation[::factor] if factor > 1 else np.ones(1)
+    return np.asarray(kept[: 1 + np.max(np.flatnonzero(np.abs(kept) > 1e-3 * kept[0]))] / kept[0])
 
 
 def observed(model: GeneratedModel, motion: Motion, study: Study, rate: float) -> Observation:

@@ -97,8 +97,8 @@ class Sinusoids:
     def __post_init__(self) -> None:
         _positive("sinusoids", length=self.length, terms=self.terms, highest=self.highest, ramp=self.ramp)
         if 2 * self.ramp > self.length:
-            raise InputError(
-                f"sinusoids rise and fall within {self.ramp} s each, more than their length of {self.length} s; shorten `ramp`"
+            raise SettingsError(
+                f"sinusoids rise and fall within {self.ramp} s each, more than their length of {self.length} s; shorten it", path=("ramp",)
             )
 
     @property
@@ -300,7 +300,7 @@ def family_from_mapping(mapping: Mapping[str, Any]) -> Family:
     settings = dict(mapping)
     kind = FAMILIES.get(str(settings.pop("family", None)))
     if kind is None:
-        raise InputError(f"no family {mapping.get('family')!r} of trajectories; there are {', '.join(FAMILIES)}")
+        raise SettingsError(f"no family {mapping.get('family')!r} of trajectories; there are {', '.join(FAMILIES)}", path=("family",))
     family: Family = structure(kind, settings)
     return family
 

@@ -56,7 +56,7 @@ def excitation_page(robot: str, verdict: str, svg: bytes, summary: Mapping[str, 
         "Predicted %sigma",
         ("parameter", "this motion", *(("motion of the record",) if before else ())),
         rows,
-        f"Parameters and torque deviations: {summary['parameters_from']}. Residuals are taken as white at the decimated rate; filtered ones are not.",
+        f"Parameters and torque deviations: {summary['parameters_from']}. Torque noise is taken as white at the sampling rate; model error is not.",
     )
     count = len(next(iter(summary["limits_used"].values())))
     used = Table(

@@ -3,8 +3,9 @@
 From each start, first -log det(W_w'W_w) is lowered, which is smooth and does not depend on the scale of a column, then the criterion itself.
 Condition numbers and largest deviations are followed by the smooth bounds
 
-    cond^2 <= (tr A^4 tr A^-4)^(1/4),     max_i C_ii <= (sum_i C_ii^4)^(1/4),     A = W_w'W_w, C = A^-1.
+    s_max <= (tr A^4)^(1/8),   1/s_min <= (tr C^4)^(1/8),   max_i C_ii <= (sum_i C_ii^4)^(1/4),     A = W_w'W_w, C = A^-1,
 
+and "cond" stands for s_max/s_min^2: a small condition number alone is also had by exciting the well known parameters less.
 Limits hold at the points of the grid with a margin, which is widened until they hold at the controller rate. sign(qd) is tanh(qd/v0) here and
 sign(qd) again in every figure that is reported.
 """
@@ -19,7 +20,7 @@ import casadi as ca
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.excitation import Array, Limits, Weights, criterion_of, excesses, observed
+from runtime.excitation import Array, Limits, Weights, criterion_of, excesses, kept_correlation, observed
 from runtime.excitation_settings import ExcitationSettings
 from runtime.model import GeneratedModel
 from runtime.processes import results
@@ -115,7 +116,7 @@ def excite(
     ]
     _, motion, margin = min(judged, key=lambda found: found[0])
     seen = observed(model, motion, study, settings.rate)
-    sigma = dict(zip(weights.names, map(float, weights.relative_sigma(seen)), strict=True))
+    sigma = dict(zip(weights.names, map(float, weights.relative_sigma(seen, kept_correlation(study.signals, settings.rate))), strict=True))
     return Excitation(motion, weights.condition(seen), sigma, tuple(starts), margin)
 
 
@@ -195,7 +196,7 @@ def _spread(A: Any, criterion: str) -> Any:
     if criterion == "sigma":
         return ca.log(ca.sum1(ca.diag(C) ** 4)) / 4
     A2, C2 = ca.mtimes(A, A), ca.mtimes(C, C)
-    return (ca.log(ca.sumsqr(A2)) + ca.log(ca.sumsqr(C2))) / 4
+    return (ca.log(ca.sumsqr(A2)) + 2 * ca.log(ca.sumsqr(C2))) / 8
 
 
 def _constraints(symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q: Any, qd: Any, qdd: Any) -> tuple[Any, Array, Array]:

@@ -94,7 +94,7 @@ def _known(model: GeneratedModel, study: Study, settings: ExcitationSettings, re
     from runtime.errors import InputError
     from runtime.essential import essential
     from runtime.estimators import estimate
-    from runtime.excitation import weights_of
+    from runtime.excitation import kept_correlation, weights_of
     from runtime.observation import observe, stack
 
     functions: Any = model
@@ -114,7 +114,14 @@ def _known(model: GeneratedModel, study: Study, settings: ExcitationSettings, re
     s = [joint.sigma_rho for joint in fit.per_joint]
     weights = weights_of(model, settings, by_name, essential=chosen.names, s=s)
     names = ", ".join(record.name for record in records)
-    return Known(study, fit.X, f"estimate of {names}", weights, weights.condition(seen), weights.relative_sigma(seen))
+    return Known(
+        study,
+        fit.X,
+        f"estimate of {names}",
+        weights,
+        weights.condition(seen),
+        weights.relative_sigma(seen, kept_correlation(study.signals, records[0].rate)),
+    )
 
 
 def summary_of(model: GeneratedModel, found: Excitation, known: Known, settings: ExcitationSettings, limits: Limits) -> dict[str, Any]:

@@ -1,0 +1,167 @@
+"""The search for exciting motions: limits hold, the criterion falls, what cannot be is said; predictions against identification."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from runtime.errors import InputError, SettingsError
+from runtime.estimators import estimate
+from runtime.excitation import excesses, limits_of, observed, usage, weights_of
+from runtime.excitation_settings import ExcitationSettings, Sphere
+from runtime.mapping import structure
+from runtime.model import load_model
+from runtime.observation import observe
+from runtime.record import Record
+from runtime.studies.excitation import Problem, _search, excite, one_start, smoothed
+from runtime.study import Decimate, Lowpass, Signals, Study
+from runtime.symbolic_model import load_symbolic
+from runtime.trajectories import Motion, Part, motion_from_mapping
+from symgen.description import load_robot
+from symgen.emit import generate_files
+
+STUDY = Study(signals=Signals(lowpass=Lowpass(cutoff=20.0), decimate=Decimate(factor=10)))
+VALUES = {"XX1": 0.1, "ZZ1": 0.3, "MX1": 0.8, "MY1": 0.1, "M1": 3.0, "ZZ2": 0.12, "MX2": 0.4, "MY2": 0.05, "M2": 1.5}
+FRICTION = {"FV1": 1.0, "FS1": 2.0, "FV2": 0.5, "FS2": 1.0, "Ia1": 0.2, "Ia2": 0.1}
+LIMITS = {"q": [1.5, [-2.0, 1.0]], "qd": [3.0, 4.0], "qdd": [15.0, 25.0]}
+S = (0.5, 0.2)
+
+
+@pytest.fixture(scope="module")
+def planar(tmp_path_factory: pytest.TempPathFactory) -> tuple[object, str, np.ndarray]:
+    folder: Path = tmp_path_factory.mktemp("planar")
+    for name, text in generate_files(load_robot("planar_2r"), targets=("numpy", "casadi")).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    model = load_model(folder / "planar_2r.py")
+    standard = {name: {**VALUES, **FRICTION}.get(name, 0.0) for name in model.STANDARD_PARAMETERS}  # type: ignore[attr-defined]
+    return model, str(folder / "planar_2r_casadi.py"), np.asarray(model.base_parameters(standard))  # type: ignore[attr-defined]
+
+
+def settings(**changes: object) -> ExcitationSettings:
+    parts = ({"family": "fourier", "period": 4, "harmonics": 3}, {"family": "point-to-point", "points": 4, "travel": 0.8, "blend": 0.2})
+    return structure(
+        ExcitationSettings,
+        {"parts": parts, "columns": "all", "limits": LIMITS, "torque_sigma": S, "starts": 1, "iterations": 40, **changes},
+    )
+
+
+def search(planar: tuple, asked: ExcitationSettings) -> object:
+    model, path, X = planar
+    weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
+    return excite(model, path, STUDY, asked, weights, limits_of(model, asked.limits), X)
+
+
+def test_smooth_sign_is_tanh_and_nothing_else_changes(planar: tuple) -> None:
+    symbolic = load_symbolic(planar[1])
+    smooth = smoothed(symbolic.regressor, 1e-4)
+    rng = np.random.default_rng(0)
+    q, qd, qdd = rng.standard_normal((3, 2))
+    constants = list(symbolic.CONSTANTS.values())
+    exact, near = (np.array(f(q, qd, qdd, *constants)) for f in (symbolic.regressor, smooth))
+    assert np.allclose(exact, near, rtol=0, atol=1e-12)
+    near = np.array(smoothed(symbolic.regressor, 0.1)(q, np.array([0.05, -0.02]), qdd, *constants))
+    friction = [symbolic.BASE_PARAMETERS.index(name) for name in ("FS1", "FS2")]
+    assert np.allclose(near[[0, 1], friction], np.tanh([0.5, -0.2]))
+    assert ca.OP_SIGN not in [smooth.instruction_id(k) for k in range(smooth.n_instructions())]
+
+
+@pytest.mark.parametrize("criterion", ["cond", "sigma", "logdet"])
+def test_motion_within_limits_and_better_than_the_start(planar: tuple, criterion: str) -> None:
+    model, path, X = planar
+    asked = settings(criterion=criterion, begin=[0.1, -0.2])
+    found = search(planar, asked)
+    limits = limits_of(model, asked.limits)
+    assert excesses(model, found.motion, limits, asked, X, rate=5000.0) == []
+    shares = usage(model, found.motion, limits, 1000.0, X)
+    assert max(map(max, shares.values())) <= 1.0
+    assert max(map(max, shares.values())) > 0.7  # some limit is used
+    q, qd, qdd = found.motion.states(np.array([0.0, found.motion.duration]))
+    assert np.allclose(q[0], [0.1, -0.2], atol=1e-6)
+    assert np.abs(qd).max() < 1e-5
+    assert np.abs(qdd).max() < 1e-4
+    weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
+    first = one_start(Problem(path, replace(asked, iterations=1), weights, limits, X), 0)
+    begun = observed(model, motion_from_mapping(first.motion), STUDY, asked.rate)
+    seen = observed(model, found.motion, STUDY, asked.rate)
+    assert weights.relative_sigma(seen).max() < 0.8 * weights.relative_sigma(begun).max()
+    assert found.condition == pytest.approx(np.linalg.cond(weights.matrix(seen)))
+    parts = found.motion.parts
+    assert np.allclose(parts[0].family.joint(np.array([4.0]), parts[0].p[:, 0], np)[0], parts[1].p[0, 0], atol=1e-5)
+
+
+def test_prediction_is_what_identification_finds(planar: tuple) -> None:
+    """200 draws of white torque noise at the raw rate: scatter of the weighted estimate against the predicted %sigma, within 20 %."""
+    model, _, X = planar
+    found = search(planar, settings())
+    t, q, qd, qdd = found.motion.sampled(1000.0)
+    clean = model.inverse_dynamics(q, qd, qdd, X)
+    asked = replace(STUDY, estimate=replace(STUDY.estimate, method="wls"))
+    rng = np.random.default_rng(3)
+    deviations = np.array(S) / np.sqrt(_power_kept())
+    estimates = []
+    for _ in range(60):
+        record = Record(t=t, q=q, tau=clean + deviations * rng.standard_normal(clean.shape), rate=1000.0)
+        estimates.append(estimate(observe(model, record, asked), asked.estimate, model=model).X)
+    size = weights_of(model, settings(), dict(zip(model.BASE_PARAMETERS, X, strict=True))).size
+    scatter = 100 * np.std(estimates, axis=0, ddof=1) / size
+    ratio = scatter / np.array(list(found.relative_sigma.values()))
+    assert 0.8 < np.sqrt(np.mean(ratio**2)) < 1.2
+    assert np.all((ratio > 0.6) & (ratio < 1.5))  # 60 draws: each deviation is known to about 10 %
+
+
+def _power_kept() -> float:
+    """Variance that decimation by 10 leaves of white noise of variance 1."""
+    from scipy.signal import decimate
+
+    noise = np.random.default_rng(0).standard_normal(400_000)
+    return float(np.var(decimate(noise, 10, zero_phase=True)[50:-50]))
+
+
+def test_torque_limits_hold(planar: tuple) -> None:
+    model, _, X = planar
+    free = search(planar, settings())
+    largest = np.abs(model.inverse_dynamics(*free.motion.sampled(1000.0)[1:], X)).max(axis=0)
+    asked = settings(limits={**LIMITS, "tau": (0.8 * largest).tolist()}, torque_rms=(0.5 * largest).tolist(), smooth=0.02)
+    found = search(planar, asked)
+    tau = model.inverse_dynamics(*found.motion.sampled(1000.0)[1:], X)
+    assert np.all(np.abs(tau).max(axis=0) <= 0.8 * largest)
+    assert np.all(np.sqrt(np.mean(tau**2, axis=0)) <= 0.5 * largest)
+
+
+def test_spheres_stay_apart(planar: tuple) -> None:
+    model = planar[0]
+    spheres = [{"frame": 0, "radius": 0.1}, {"frame": 2, "radius": 0.1, "centre": [0.4, 0, 0]}]
+    wide = {"q": [1.5, 3.0], "qd": [3.0, 8.0], "qdd": [15.0, 60.0]}
+    found = search(planar, settings(spheres=spheres, apart=[[1, 2]], gap=0.25, limits=wide))
+    T = model.frame_poses(found.motion.sampled(500.0)[1])
+    tip = T[:, -1, :3, :3] @ np.array([0.4, 0.0, 0.0]) + T[:, -1, :3, 3]
+    assert np.linalg.norm(tip, axis=1).min() >= 0.45 - 1e-3
+
+
+def test_what_cannot_be_is_said(planar: tuple) -> None:
+    with pytest.raises(InputError, match="no motion within the limits"):
+        search(planar, settings(begin=[3.0, 0.0]))
+    with pytest.raises(SettingsError, match="no limits of qdd"):
+        limits_of(planar[0], {"q": [1, 1], "qd": [1, 1], "qdd": None})
+    with pytest.raises(SettingsError, match="expected 2 numbers or pairs"):
+        limits_of(planar[0], {**LIMITS, "q": [1.0]})
+    with pytest.raises(SettingsError, match="no parameter ZZ9"):
+        weights_of(planar[0], settings(columns=["ZZ9"]), {})
+    with pytest.raises(SettingsError, match="spheres"):
+        settings(apart=[[1, 2]])
+    with pytest.raises(SettingsError, match="no family"):
+        settings(parts=[{"family": "spiral"}])
+    assert Sphere(1, 0.2).centre == (0.0, 0.0, 0.0)
+
+
+def test_a_wider_margin_starts_from_the_motion_found(planar: tuple) -> None:
+    model, path, X = planar
+    asked = settings()
+    weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
+    problem = Problem(path, asked, weights, limits_of(model, asked.limits), X)
+    start = one_start(problem, 0)
+    motion = motion_from_mapping(start.motion)
+    again = _search(problem, 0, Motion(tuple(Part(p.family, p.p) for p in motion.parts)))
+    assert again.criterion <= start.criterion + 1e-3
