@@ -183,19 +183,25 @@ def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record 
         return {}
     fits: dict[Coupling, Estimate] = {}
     for coupling in COUPLINGS:
-        pairs = zip(records, study.record, strict=True)
-        changed = [recoupled(record, drives.decoupled(settings.coupling), drives.decoupled(coupling)) for record, settings in pairs]
+        changed: list[Record | Stream] = []
+        for record, settings in zip(records, study.record, strict=True):
+            used, wanted = drives.decoupled(settings.coupling), drives.decoupled(coupling)
+            again = recoupled(record, used, wanted) if isinstance(record, Record) else recoupled_stream(record, used, wanted)
+            changed.append(again)
         fits[coupling] = estimate(observed(model, changed, study, windows=()), point_estimate(study.estimate), model=model)
     return fits
 
 
-def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record | Stream:
+def recoupled(record: Record, used: Drives, wanted: Drives) -> Record:
     """The record as the drives `wanted` would have turned its motor side into the joint side; `used` are those it was read with."""
+    q = wanted.joint_position(used.motor_position(record.q))
+    return replace(record, q=q, tau=wanted.joint_torque(used.motor_command(record.tau)))
+
+
+def recoupled_stream(stream: Stream, used: Drives, wanted: Drives) -> Stream:
+    """`recoupled` of a record that is read by blocks."""
 
     def change(q: Array, tau: Array) -> tuple[Array, Array]:
         return wanted.joint_position(used.motor_position(q)), wanted.joint_torque(used.motor_command(tau))
 
-    if not isinstance(record, Record):
-        return ChangedStream(record, change)
-    q, tau = change(record.q, record.tau)
-    return replace(record, q=q, tau=tau)
+    return ChangedStream(stream, change)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -18,10 +19,12 @@ from runtime.drives import Drives
 from runtime.errors import InputError
 from runtime.io.conversion import Conversion, column_names, conversion, finite_columns
 from runtime.io.files import sha256_of
-from runtime.io.records import file_hashes, record_files
+from runtime.io.records import file_hashes, read_records, record_files
 from runtime.io.table import BLOCK_READERS, BlockTable, open_table
 from runtime.io.timing import SECONDS, clock
 from runtime.model import GeneratedModel
+from runtime.record import Record
+from runtime.record_stream import Stream
 from runtime.study import SHORTEST, Columns, RecordSettings
 
 Array = np.ndarray
@@ -118,6 +121,15 @@ def open_streams(
         if stream.n != len(model.JOINTS):
             raise InputError(f"{stream.n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}", file=stream.name)
     return streams
+
+
+def records_or_streams(
+    settings: Sequence[RecordSettings], model: GeneratedModel, stream: Literal["auto", "off"] | int, *, folder: Path | None = None
+) -> list[Record | Stream]:
+    """The records in memory, or to be read by blocks, as the setting `stream` of a study says."""
+    if stream == "off" or (stream == "auto" and not are_large(settings, folder)):
+        return [*read_records(settings, model, folder=folder)]
+    return [*open_streams(settings, model, folder=folder, block=BLOCK if stream == "auto" else stream)]
 
 
 def are_large(settings: Sequence[RecordSettings], folder: Path | None = None) -> bool:

@@ -150,3 +150,27 @@ def test_folder_that_cannot_be_written(tmp_path):
     (tmp_path / "out").write_text("a file stands here")
     result = run("planar_2r", plain_csv(tmp_path / "record.csv"), "-o", tmp_path / "out")
     assert result.exit_code == 2 and result.stderr.startswith("error: ")
+
+
+def test_blocks_give_the_same_result(tx40_data):
+    """Every figure of estimate.json but the settings, to 1e-9 of the largest of its kind."""
+    whole, blocks = (json.loads(run("tx40", "tx40", "--json", *options).stdout) for options in ((), ("--block", 10000)))
+    assert blocks["settings"].pop("stream") == {"block": 10000}
+    for key in ("X", "sigma", "sigma_corrected"):
+        np.testing.assert_allclose(blocks[key], whole[key], rtol=0, atol=1e-9 * np.abs(whole[key]).max())
+    assert blocks["settings"] == whole["settings"] and blocks["verdict"] == whole["verdict"]
+    assert blocks["essential"]["names"] == whole["essential"]["names"]
+    for key, fit in whole["coupling"].items():
+        np.testing.assert_allclose(blocks["coupling"][key]["relative_error"], fit["relative_error"], rtol=1e-9)
+
+
+def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
+    """Unless the study says otherwise; the result says so."""
+    t = np.arange(3000) / 1000
+    np.savez(tmp_path / "axis.npz", t=t, q1=0.2 * np.sin(6 * t), tau1=20 * np.cos(6 * t))
+    monkeypatch.setattr("runtime.io.streams.LARGE", 1000)
+    settings = json.loads(run("emps", tmp_path / "axis.npz", "--json").stdout)["settings"]
+    assert settings["stream"] == {"block": 65536}
+    (tmp_path / "study.yaml").write_text("record: {files: axis.npz}\nstream: off\n")
+    assert "stream" not in json.loads(run("emps", tmp_path / "study.yaml", "--json").stdout)["settings"]
+    assert run("emps", tmp_path / "study.yaml", "--block", "3").exit_code == 2
