@@ -1,0 +1,169 @@
+"""The whole identification job of the TX40 against figaroh's on the same record: from two CSV files to base parameters with their deviations.
+
+    python -m venv FOLDER && FOLDER/bin/pip install figaroh
+    python benchmarks/figaroh_job.py --figaroh FOLDER/bin/python [--rounds 7]        needs the record `tx40`: SYMGEN_DATA, or be on line
+
+Both read the same files, take the motor side to the joints, cut the record at 7.5 s, filter (median 5, Butterworth of order 4 at 50 Hz on the
+positions, which is what figaroh filters), differentiate twice, evaluate the regressor with friction, actuators, offsets and the coupled wrist,
+decimate by 40 with zero phase, and solve by ordinary least squares. Differences that stay: figaroh pads its median with zeros and cuts the record
+before it filters, and does not filter torques by the median (here they are taken through it, which costs more); it finds its base parameters by QR
+in every job, here they are known from the generation. figaroh's report of the result is counted, ours (%sigma, residuals by joint) too.
+
+First the results are compared: relative error, and the predicted torques of both against each other. Then each round runs every contender once, in
+rotated order, pinned to one core, one BLAS thread, CPU time without imports; ratios are taken per round and given as median [range].
+"""
+
+# ruff: noqa: E402
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"  # before numpy, and for figaroh
+
+import numpy as np
+
+from runtime.estimate import Estimate
+from runtime.estimators import estimate
+from runtime.io.datasets import dataset_study, fetch
+from runtime.io.files import read_bytes
+from runtime.io.records import read_records
+from runtime.model import GeneratedModel, load_model
+from runtime.observation import Observation, observe
+from runtime.studies.compiled import compiled_model
+from runtime.study import Decimate, Lowpass, Rows, Signals, Study, study_from_mapping
+from symgen.description import load_robot
+from symgen.emit import generate_files
+
+END, FACTOR, CUTOFF = 7.5, 40, 50.0  # s, n_d, Hz
+FILES = ("pos_read_data.csv", "curr_data.csv")
+
+
+def study_of(files: list[str]) -> Study:
+    given = study_from_mapping(dataset_study("tx40"))
+    records = tuple(replace(record, files=tuple(files), dataset=None) for record in given.record)
+    signals = Signals(median=5, lowpass=Lowpass(cutoff=CUTOFF, on=("q",)), decimate=Decimate(factor=FACTOR))
+    return replace(given, record=records, signals=signals, rows=Rows(window=(0.0, END), trim=0))
+
+
+def job(model: GeneratedModel, study: Study) -> tuple[Observation, Estimate]:
+    """From files to parameters and their deviations."""
+    observation = observe(model, read_records(study.record, model)[0], study)
+    return observation, estimate(observation, study.estimate, model=model)
+
+
+class Figaroh:
+    """figaroh in a process of its own."""
+
+    def __init__(self, python: str, settings: dict[str, Any]) -> None:
+        worker = Path(__file__).with_name("figaroh_worker.py")
+        self.process = subprocess.Popen([python, str(worker)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self._write(json.dumps(settings))
+
+    def _write(self, line: str) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+
+    def ask(self, line: str) -> dict[str, Any]:
+        self._write(line)
+        assert self.process.stdout is not None
+        answer = self.process.stdout.readline()
+        if not answer:
+            sys.exit("figaroh stopped; its message stands above")
+        return dict(json.loads(answer))
+
+
+def settings_of(files: list[str], study: Study) -> dict[str, Any]:
+    robot = load_robot("tx40")
+    value = robot.constants
+    assert robot.drives is not None
+    return {
+        "files": files,
+        "frames": [(f.j, f.ant, f.alpha.value(value), f.d.value(value), f.r.value(value)) for f in robot.frames],
+        "gravity": [e.value(value) for e in robot.gravity],
+        "ratio": robot.drives.ratio,
+        "offset": robot.drives.offset,
+        "truncate": [0, int(END * 5000) + 1],
+        "factor": FACTOR,
+        "filter": {"nbutter": 4, "f_butter": CUTOFF, "med_fil": 5, "f_sample": 5000},
+    }
+
+
+def compare(observation: Observation, found: Estimate, other: dict[str, Any]) -> None:
+    """Relative errors of both, and predicted torques against each other, on rows away from the ends."""
+    n = observation.n
+    W = observation.W
+    ours, Y = (W @ found.X).reshape(n, -1), observation.Y.reshape(n, -1)
+    theirs, Y_theirs = (np.array(other[key]).reshape(n, -1) for key in ("predicted", "Y"))
+    K = min(ours.shape[1], theirs.shape[1])
+    inside = slice(3, K - 3)
+    norm = np.linalg.norm
+    print(f"parameters        {len(found.X)} and {other['parameters']}")
+    print(f"relative error    {found.relative_error:.3f} % and {100 * norm(Y_theirs - theirs) / norm(Y_theirs):.3f} %")
+    print(f"measured torques  differ by {100 * norm((Y - Y_theirs[:, :K])[:, inside]) / norm(Y):.3f} % (the median on ours)")
+    print(f"predicted torques differ by {100 * norm((ours[:, :K] - theirs[:, :K])[:, inside]) / norm(Y):.3f} % of the measured ones\n")
+
+
+def cpu(function: Callable[[], object]) -> float:
+    start = time.process_time()
+    function()
+    return time.process_time() - start
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--figaroh", default=sys.executable, help="a Python that has figaroh")
+    parser.add_argument("--rounds", type=int, default=7)
+    arguments = parser.parse_args()
+    if subprocess.run([arguments.figaroh, "-c", "import figaroh"], check=False).returncode:
+        sys.exit(f"{arguments.figaroh} has no figaroh; see the head of this file")
+    load = os.getloadavg()[0]
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    with TemporaryDirectory() as folder:
+        files = []
+        for name in FILES:
+            (Path(folder) / name).write_bytes(read_bytes(fetch("tx40", name)))
+            files.append(str(Path(folder) / name))
+        for name, text in generate_files(load_robot("tx40"), targets=("numpy", "c"), command="tx40").items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        study = study_of(files)
+        model = load_model("tx40", folder=Path(folder))
+        c = compiled_model(model, cache=Path(folder) / "cache")
+        figaroh = Figaroh(arguments.figaroh, settings_of(files, study))
+        contenders: dict[str, Callable[[], float]] = {
+            "figaroh": lambda: float(figaroh.ask("run")["seconds"]),
+            "symgen, NumPy": lambda: cpu(lambda: job(model, study)),
+            "symgen, C": lambda: cpu(lambda: job(c, study)),
+        }
+        for run in contenders.values():
+            run()
+        compare(*job(model, study), figaroh.ask("result"))
+        times: dict[str, list[float]] = {name: [] for name in contenders}
+        for r in range(arguments.rounds):
+            for k in range(len(contenders)):
+                name = list(contenders)[(k + r) % len(contenders)]
+                times[name].append(contenders[name]())
+        figaroh.process.terminate()
+        shutil.rmtree(Path(folder) / "cache", ignore_errors=True)
+    print(f"CPU time on one core, {arguments.rounds} rounds, load at the start {load:.1f}")
+    for name, row in times.items():
+        per_round = [a / b for a, b in zip(times["figaroh"], row, strict=True)]
+        print(f"{name:14} {1e3 * statistics.median(row):8.0f} ms   figaroh / it {statistics.median(per_round):6.1f}  "
+              f"[{min(per_round):.1f}, {max(per_round):.1f}]")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
