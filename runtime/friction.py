@@ -112,6 +112,11 @@ class FrictionCurve:
         return f"{aligned(rows)}\n{self.chosen}: {values}" + (f"\n{self.note}" if self.note else "")
 
     @property
+    def label(self) -> str:
+        """The chosen law, told apart where its Stribeck term makes no peak."""
+        return f"{self.chosen} (no peak)" if self.law.parameters.get("FST", 1.0) < 0 else self.chosen
+
+    @property
     def note(self) -> str:
         """What the sign of FST means; empty for laws without it."""
         excess = self.law.parameters.get("FST")
@@ -301,8 +306,11 @@ def _p_value(squares_first: float, squares: float, terms_first: int, terms: int,
 
 
 def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
-    """Centres, means and half intervals over bins with equal numbers of rows, empty ones left out; and what averages others alike."""
-    edges = np.unique(np.quantile(terms.v, np.linspace(0, 1, BINS + 1)))
+    """Centres, means and half intervals over bins of about equal numbers of rows, none across standstill; and what averages others alike."""
+    sides = [terms.v[terms.v < 0], terms.v[terms.v >= 0]]
+    shares = [max(round(BINS * len(side) / len(terms.v)), 1) for side in sides]
+    inner = [np.quantile(side, np.linspace(0, 1, k + 1)) for side, k in zip(sides, shares, strict=True) if len(side)]
+    edges = np.unique(np.concatenate([*inner, [0.0]]))
     which = np.clip(np.searchsorted(edges, terms.v, side="right") - 1, 0, max(len(edges) - 2, 0))
     count = np.bincount(which)
     used = np.flatnonzero(count > 1)

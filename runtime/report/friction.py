@@ -23,11 +23,13 @@ def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figur
         for ax, curve in zip(axes, curves, strict=False):
             ax.plot(curve.v, curve.f, ".", color="#C8C8C8", markersize=2, zorder=1, label="rows", rasterized=True)
             ax.errorbar(curve.centre, curve.mean, curve.half, fmt="o", color=plots.BLACK, markersize=3, linewidth=1.0, label="bins, 95 %")
-            first = curve.laws[0].name
-            ax.plot(curve.centre, curve.drawn[first], color=plots.BLUE, linewidth=1.2, linestyle="--", label="Coulomb and viscous")
-            if curve.chosen != first:
-                ax.plot(curve.centre, curve.drawn[curve.chosen], color=plots.ORANGE, linewidth=1.4, label="chosen law")
-            ax.set_title(f"joint {curve.joint}: {curve.chosen}", fontsize=9)
+            first, chosen = curve.laws[0].name, curve.chosen
+            for side in (curve.centre < 0, curve.centre >= 0):
+                x = curve.centre[side]
+                ax.plot(x, curve.drawn[first][side], color=plots.BLUE, linewidth=1.2, linestyle="--", label="Coulomb and viscous")
+                if chosen != first:
+                    ax.plot(x, curve.drawn[chosen][side], color=plots.ORANGE, linewidth=1.4, label="chosen law")
+            ax.set_title(f"joint {curve.joint}: {curve.label}", fontsize=9)
             ax.set_xlabel(f"velocity, {speed}")
             ax.set_ylabel(f"friction, {unit}")
             ax.axhline(0, color=plots.GREY, linewidth=0.6)
@@ -35,7 +37,7 @@ def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figur
         for ax in axes[len(curves) :]:
             ax.set_visible(False)
         entries = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-        figure.legend(list(entries.values()), list(entries), ncols=len(entries), loc="outside upper center")
+        figure.legend(list(entries.values()), list(entries), ncols=2 * columns, loc="outside upper center")
     return figure
 
 
@@ -47,7 +49,7 @@ def friction_section(curves: Sequence[FrictionCurve], unit: str = "N m") -> Sect
         for law in curve.laws
     ]
     chosen = [
-        (curve.joint, curve.chosen, ", ".join(f"{name} {x:.4g} ± {curve.law.sigma[name]:.2g}" for name, x in curve.law.parameters.items()))
+        (curve.joint, curve.label, ", ".join(f"{name} {x:.4g} ± {curve.law.sigma[name]:.2g}" for name, x in curve.law.parameters.items()))
         for curve in curves
     ]
     text = (
