@@ -19,8 +19,10 @@ from runtime.essential import Essential, essential
 from runtime.estimate import Estimate
 from runtime.estimators import LINEAR, estimate, linear_companion, point_estimate
 from runtime.estimators.reduction import Reduction, Window
+from runtime.estimators.tls import tls_options
 from runtime.model import GeneratedModel
 from runtime.observation import Observation, observe, stack
+from runtime.perturbation import with_errors
 from runtime.record import Record
 from runtime.record_stream import ChangedStream, Stream
 from runtime.streaming import halves, reduce
@@ -170,8 +172,16 @@ def observed(
     """The rows of the records, or what is left of them where they are read by blocks; windows : as in `streaming.reduce`."""
     in_memory = [record for record in records if isinstance(record, Record)]
     if in_memory:
-        return stack([observe(model, record, study) for record in in_memory])
+        return stack([rows_of(model, record, study) for record in in_memory])
     return reduce(model, [record for record in records if not isinstance(record, Record)], study, windows=windows)
+
+
+def rows_of(model: GeneratedModel, record: Record, study: Study) -> Observation:
+    """Rows of one record, with the errors of their columns where the method asks for them."""
+    seen = observe(model, record, study)
+    if study.estimate.method != "tls":
+        return seen
+    return with_errors(model, record, study, seen, tls_options(study.estimate).position_error)
 
 
 def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record | Stream]) -> dict[Coupling, Estimate]:

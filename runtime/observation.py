@@ -43,6 +43,7 @@ class Observation:
     dropped : rows left out, per joint, by reason ("trim", "low_speed", "mask"), counted after decimation.
     settings : the signals and rows used, complete (to_mapping), with the factor that "auto" became.
     files : SHA-256 of the measured files, by name.
+    errors : ndarray, shape (n, b, b), mean covariance of the errors of one row of W of joint j, where it is known (`runtime.perturbation`).
     """
 
     W: Array
@@ -55,6 +56,7 @@ class Observation:
     dropped: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
+    errors: Array | None = None
 
     def __post_init__(self) -> None:
         r = sum(self.rows)
@@ -84,7 +86,9 @@ class Observation:
 
     def columns(self, names: Sequence[str]) -> Observation:
         """The same rows with the named columns alone, in the order given."""
-        return replace(self, W=np.asfortranarray(self.W[:, _numbers(names, self.names)]), names=tuple(names))
+        kept = _numbers(names, self.names)
+        errors = None if self.errors is None else self.errors[:, kept][:, :, kept]
+        return replace(self, W=np.asfortranarray(self.W[:, kept]), names=tuple(names), errors=errors)
 
     def where(self, mask: Array) -> Observation:
         """The rows where `mask`, bool of shape (r,), is true."""
@@ -197,7 +201,17 @@ def stack(observations: Sequence[Observation]) -> Observation:
         if all(o.settings == first.settings for o in observations)
         else {"records": [o.settings for o in observations]},
         files=all_files([o.files for o in observations]),
+        errors=_mean_errors(observations),
     )
+
+
+def _mean_errors(observations: Sequence[Observation]) -> Array | None:
+    """Means over all rows of each joint; None unless every observation knows its errors."""
+    known = [o.errors for o in observations if o.errors is not None]
+    if len(known) < len(observations):
+        return None
+    rows = np.array([o.rows for o in observations], dtype=float)
+    return np.asarray(np.einsum("oj,ojab->jab", rows / np.maximum(rows.sum(axis=0), 1), np.array(known)))
 
 
 def all_files(hashes: Sequence[Mapping[str, str]]) -> dict[str, str]:

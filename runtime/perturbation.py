@@ -62,6 +62,7 @@ class Perturbation:
     """One record under position errors.
 
     seen : the unperturbed rows; torque : Y before rows are left out, shape (n, K).   clean : their normal equations.   smooth : by encoder, what errors of variance 1 add to them, switching columns left out.
+    errors : by encoder, ndarray, shape (n, b, b), E[dW_j'dW_j] alone.
     speeds : by encoder, ndarray, shape (n, b, K): sensitivity of the rows to dqd of that encoder, times the root of its variance.
     root : ndarray, shape (n, encoders), joint position error per encoder error.
     used : bool, shape (n, N), instants of the window nearest to a row that is used.   known : switches computed so far.
@@ -75,6 +76,7 @@ class Perturbation:
     root: Array
     clean: Normal
     smooth: tuple[Normal, ...]
+    errors: tuple[Array, ...]
     speeds: tuple[Array, ...]
     switches: tuple[Switch, ...]
     kernels: Kernels
@@ -172,7 +174,7 @@ def perturbation(
     found = switches(model, names)
     window = states[selection.samples]
     root = encoder_root(model, study, drives)
-    smooth, speeds = _smooth(model, window, selection, seen, band, root, found, dict(constants or {}))
+    smooth, errors, speeds = _smooth(model, window, selection, seen, band, root, found, dict(constants or {}))
     return Perturbation(
         seen=seen,
         torque=torque,
@@ -182,11 +184,29 @@ def perturbation(
         root=root,
         clean=_normal([seen.W[seen.joint(j)] for j in range(seen.n)], [seen.Y[seen.joint(j)] for j in range(seen.n)]),
         smooth=smooth,
+        errors=errors,
         speeds=speeds,
         switches=found,
         kernels=kernels(band, len(window), selection.factor),
         used=_used(selection, len(window)),
     )
+
+
+def with_errors(
+    model: GeneratedModel, record: Record, study: Study, observation: Observation, deviation: float, *, drives: Drives | None = None
+) -> Observation:
+    """`observation` of the record with the covariance of the errors of its columns, for errors of every encoder of that deviation.
+
+    deviation : of one raw position, rad or m, on the side study.cestac.side. Columns that switch with the sign of a speed count as exact.
+    Raises SettingsError where a median filter stands ahead of the others.
+    """
+    if study.signals.median != 1:
+        raise SettingsError(
+            f"{study.signals.median}; the errors of the columns are known for linear filters alone, use 1", path=("signals", "median")
+        )
+    part = perturbation(model, record, replace(study, cestac=replace(study.cestac, median=1)), observation.names, drives=drives)
+    total = deviation**2 * sum(part.errors)
+    return replace(observation, errors=total / np.maximum(observation.rows, 1)[:, None, None])
 
 
 def encoder_root(model: GeneratedModel, study: Study, drives: Drives | None = None) -> Array:
@@ -211,8 +231,8 @@ def _smooth(
     root: Array,
     found: Sequence[Switch],
     constants: Mapping[str, float],
-) -> tuple[tuple[Normal, ...], tuple[Array, ...]]:
-    """Per encoder: what errors of variance 1 add to the normal equations, and the sensitivities to the speed."""
+) -> tuple[tuple[Normal, ...], tuple[Array, ...], tuple[Array, ...]]:
+    """Per encoder: what errors of variance 1 add to the normal equations, E[dW'dW] of it, and the sensitivities to the speed."""
     kept = States(window.q[selection.kept], window.qd[selection.kept], window.qdd[selection.kept])
     columns = np.array([model.BASE_PARAMETERS.index(name) for name in seen.names])
     rigid = np.array(model.STRUCTURE)[columns].T & ~np.isin(np.arange(len(columns)), [s.column for s in found])
@@ -228,7 +248,7 @@ def _smooth(
         return np.asarray(D.transpose(2, 1, 0)[columns])
 
     at_rest = store(axes[:, 0], 0.0, root[:, 0])
-    smooth, speeds = [], []
+    smooth, errors, speeds = [], [], []
     for i in range(root.shape[1]):
         first, second = [], np.zeros_like(at_rest)
         for k in range(3):
@@ -236,27 +256,36 @@ def _smooth(
             up, down = (store(axes[:, k], sign * h, root[:, i]) for sign in (1, -1))
             first.append((up - down) / (2 * h))
             second += (up - 2 * at_rest + down) / (2 * h**2)
-        smooth.append(_added(seen, selection, np.array(first), band.gain * second, C, rigid))
+        squares = _squares(selection, np.array(first), C, rigid)
+        shifted = _shifted(seen, selection, band.gain * second, rigid)
+        smooth.append(Normal(squares + shifted.G, shifted.g))
+        errors.append(squares)
         speeds.append(np.where(rigid.T[:, :, None], first[1], 0.0).transpose(1, 0, 2) * selection.mask[:, None, :])
-    return tuple(smooth), tuple(speeds)
+    return tuple(smooth), tuple(errors), tuple(speeds)
 
 
-def _added(seen: Observation, selection: Selection, first: Array, second: Array, C: Array, rigid: Array) -> Normal:
-    """E[dW'dW] + W'E[dW] + E[dW]'W and E[dW]'Y by joint; first, shape (3, b, n, K), second, shape (b, n, K), C a Cholesky factor, shape (3, 3)."""
+def _squares(selection: Selection, first: Array, C: Array, rigid: Array) -> Array:
+    """E[dW'dW] by joint, shape (n, b, b); first, shape (3, b, n, K), C a Cholesky factor, shape (3, 3)."""
+    n, b = rigid.shape
+    G = np.zeros((n, b, b))
+    for j in range(n):
+        columns, used = np.flatnonzero(rigid[j]), selection.mask[j]
+        S = np.einsum("kl,kbK->blK", C, first[:, columns, j][..., used]).reshape(len(columns), 3 * int(used.sum()))
+        G[j][np.ix_(columns, columns)] = S @ S.T
+    return G
+
+
+def _shifted(seen: Observation, selection: Selection, second: Array, rigid: Array) -> Normal:
+    """W'E[dW] + E[dW]'W and E[dW]'Y by joint; second = E[dW], shape (b, n, K)."""
     n, b = rigid.shape
     G, g = np.zeros((n, b, b)), np.zeros((n, b))
     for j in range(n):
         columns, used = np.flatnonzero(rigid[j]), selection.mask[j]
-        if not len(columns):
-            continue
-        S = np.einsum("kl,kbK->blK", C, first[:, columns, j][..., used]).reshape(len(columns), -1)
         B = second[columns, j][:, used]
-        W, Y = seen.W[seen.joint(j)], seen.Y[seen.joint(j)]
-        G[j][np.ix_(columns, columns)] += S @ S.T
-        change = B @ W
+        change = B @ seen.W[seen.joint(j)]
         G[j][columns] += change
         G[j][:, columns] += change.T
-        g[j][columns] = B @ Y
+        g[j][columns] = B @ seen.Y[seen.joint(j)]
     return Normal(G, g)
 
 

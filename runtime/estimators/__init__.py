@@ -3,6 +3,7 @@
 ols   ordinary least squares               runtime/estimators/ols.py
 wls   least squares weighted by joint      runtime/estimators/wls.py
 irls  robust least squares, Huber or Tukey    runtime/estimators/irls.py
+tls   total least squares with exact columns    runtime/estimators/tls.py
 feasible  least squares among physical robots, extra consistency    runtime/estimators/feasible.py
 """
 
@@ -14,7 +15,7 @@ from typing import Any, Protocol, TypeVar
 
 from runtime.errors import SettingsError
 from runtime.estimate import Estimate
-from runtime.estimators import feasible, irls, ols, wls
+from runtime.estimators import feasible, irls, ols, tls, wls
 from runtime.estimators.linear import System, assemble
 from runtime.estimators.reduction import Reduction
 from runtime.model import GeneratedModel
@@ -56,7 +57,7 @@ def linear_companion(settings: EstimateSettings) -> EstimateSettings:
 
 def point_estimate(settings: EstimateSettings) -> EstimateSettings:
     """The settings of an estimate whose deviations nobody reads: without resampling."""
-    return replace(settings, options={**settings.options, "bootstrap": 0}) if settings.method == "feasible" else settings
+    return replace(settings, options={**settings.options, "bootstrap": 0}) if settings.method in ("feasible", "tls") else settings
 
 
 def linear_estimate(
@@ -67,7 +68,12 @@ def linear_estimate(
     return assemble(system, system.solve(), model=model, provenance=provenance)
 
 
-METHODS: Mapping[str, Estimator] = {**dict.fromkeys(LINEAR, linear_estimate), "feasible": feasible.feasible, "irls": irls.irls}
+METHODS: Mapping[str, Estimator] = {
+    **dict.fromkeys(LINEAR, linear_estimate),
+    "feasible": feasible.feasible,
+    "irls": irls.irls,
+    "tls": tls.tls,
+}
 """Every method, by the name that `estimate.method` of a study gives it."""
 
 

@@ -1,0 +1,140 @@
+"""Resolution advisor against sampling: the steps it predicts for 1 % and 5 %, and what both ways cost.
+
+    python benchmarks/advisor.py [emps tx40 haptic]          needs the records: set SYMGEN_DATA, or be on line
+
+Steps: CESTAC at steps in the ratio 1.3, RUNS runs each, all encoders alike; where |change of the mean| first reaches a limit between two of them, on
+logarithmic axes. The interval is that of |change| +- the half width of Student's. Predicted over sampled should be within 15 %.
+
+Cost: CPU time of one advice without runs (every choice of encoders, both limits, the curve) over that of the sampling it stands for: for every choice of
+encoders, LEVELS steps (to bracket two limits within 15 %) of five runs, as the chapter has it; or of as many as bring the Student interval of every
+parameter that matters below 30 % of the limit at the step where it reaches it, since the advice gives those steps too. One core, BLAS on one thread, medians of interleaved rounds.
+"""
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+
+from symgen.cli.session import opened_model, single_thread
+
+single_thread()
+
+import numpy as np  # noqa: E402  (numpy reads the number of threads when it loads)
+from scipy.special import stdtrit  # noqa: E402
+
+from runtime.advice import crossing  # noqa: E402
+from runtime.cestac import cestac  # noqa: E402
+from runtime.essential import essential  # noqa: E402
+from runtime.estimators import linear_system  # noqa: E402
+from runtime.estimators.linear import assemble  # noqa: E402
+from runtime.io.datasets import dataset_study  # noqa: E402
+from runtime.io.records import read_records  # noqa: E402
+from runtime.observation import observe  # noqa: E402
+from runtime.perturbation import perturbation  # noqa: E402
+from runtime.resolution import LIMITS, Sampler, advise  # noqa: E402
+from runtime.study import study_from_mapping  # noqa: E402
+from symgen.cli.haptic_record import haptic_record, haptic_study  # noqa: E402
+
+RUNS = {"emps": 100, "tx40": 60, "haptic": 30}
+LEVELS = 8
+ROUNDS = 5
+RATIO = 1.3
+
+
+def opened(name, model, folder):
+    """Study, without median filter ahead of the rounding, and record."""
+    if name == "haptic":
+        content, settings = haptic_record(model)
+        (folder / settings.files[0]).write_bytes(content)
+        study = replace(haptic_study(5), record=(settings,))
+    else:
+        study = study_from_mapping(dataset_study(name))
+    return study, read_records(study.record, model, folder=folder)[0]
+
+
+def steps_table(name, model, study, record, names):
+    """Predicted and sampled steps of every parameter that matters."""
+    advice = advise(model, record, study, columns=names, encoders=("all",), confirm=False)
+    first = advice.encoders[0]
+    part = perturbation(model, record, study, names)
+    system = linear_system(part.seen, replace(study.estimate, columns="all"))
+    sampler = Sampler(model, (record,), (part,), study.cestac, study.estimate, {}, assemble(system, system.solve(), model=model))
+    low, high = first.limits[0].delta / RATIO**2, first.delta[-1] / RATIO
+    grid = np.geomspace(low, high, round(np.log(high / low) / np.log(RATIO)) + 1)
+    points = [sampler.level(delta, range(record.n), RUNS[name]) for delta in grid]
+    e, half = np.array([np.abs(p.change) for p in points]), np.array([p.half_width for p in points])
+    print(f"\n{name}: {RUNS[name]} runs at {len(grid)} steps; predicted / sampled step, and the sampled interval over the sampled step")
+    within = compared = 0
+    for percent in LIMITS:
+        predicted = first.reached(percent)
+        for i in (names.index(n) for n in advice.deciding):
+            sampled = crossing(grid, e[:, i], percent)
+            least, most = crossing(grid, e[:, i] + half[:, i], percent), crossing(grid, np.clip(e[:, i] - half[:, i], 0, None), percent)
+            if not np.isfinite([predicted[i], sampled]).all():
+                continue
+            compared, within = compared + 1, within + (abs(predicted[i] / sampled - 1) <= 0.15)
+            mark = " <- advised" if names[i] == first.limits[LIMITS.index(percent)].parameter else ""
+            print(
+                f"  {percent:g} %  {names[i]:8s} {predicted[i]:.3e} {sampled:.3e}  {predicted[i] / sampled:.3f}  [{least / sampled:.2f}, {most / sampled:.2f}]{mark}"
+            )
+    print(f"  within 15 %: {within} of {compared}")
+    return advice, sampler
+
+
+def cost(name, model, study, record, names, advice, sampler):
+    """CPU times, interleaved."""
+    predicting, sampling = [], []
+    limit = advice.encoders[0].limits[0]
+    few = replace(study, cestac=replace(study.cestac, delta=(limit.delta,), runs=5, torque=None))
+    for _ in range(ROUNDS):
+        start = time.process_time()
+        whole = advise(model, record, study, columns=names, confirm=False)
+        middle = time.process_time()
+        cestac(model, record, few, columns=names)
+        predicting.append(middle - start)
+        sampling.append((time.process_time() - middle) / few.cestac.runs)
+    runs = {
+        "five runs": len(whole.encoders) * LEVELS * 5,
+        "runs for every parameter": LEVELS / 2 * needed_runs(whole, model, record, names, sampler),
+    }
+    one, all_of_it = median(sampling), median(predicting)
+    print(
+        f"{name}: prediction {1e3 * all_of_it:.0f} ms ({1e3 * min(predicting):.0f} to {1e3 * max(predicting):.0f}), one CESTAC run {1e3 * one:.1f} ms"
+    )
+    for label, count in runs.items():
+        print(
+            f"  {label}, {len(whole.encoders)} choices of encoders, {count:.0f} runs: sampling costs {count * one / all_of_it:.0f} times the prediction"
+        )
+
+
+def needed_runs(whole, model, record, names, sampler):
+    """Runs at one step, summed over choices of encoders and limits."""
+    total = 0
+    for encoder in whole.encoders:
+        chosen = range(record.n) if encoder.label == "all" else (model.JOINTS.index(int(encoder.label)),)
+        for limit in encoder.limits:
+            needed = 5
+            if np.isfinite(limit.delta):
+                point = sampler.level(limit.delta, chosen, 10)
+                reached = encoder.reached(limit.percent)
+                for i in (names.index(n) for n in whole.deciding if np.isfinite(reached[names.index(n)])):
+                    spread = point.half_width[i] * np.sqrt(10) / stdtrit(9, 0.975) * reached[i] / limit.delta
+                    needed = max(needed, np.ceil((1.96 * spread / (0.3 * limit.percent)) ** 2))
+            total += needed
+    return total
+
+
+def main():
+    """Print the tables of the robots named."""
+    for name in sys.argv[1:] or RUNS:
+        with opened_model(name) as model, TemporaryDirectory() as folder:
+            study, record = opened(name, model, Path(folder))
+            found = essential(observe(model, record, study), study.essential, study.estimate)
+            advice, sampler = steps_table(name, model, study, record, found.names)
+            cost(name, model, study, record, found.names, advice, sampler)
+
+
+if __name__ == "__main__":
+    main()

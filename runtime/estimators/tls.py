@@ -1,0 +1,268 @@
+"""Total least squares that leaves exact columns exact: errors in Y and in the columns that the position enters.
+
+    (W_2 + dW_2) X_2 + W_1 X_1 = Y + dY,  the smallest [dW_2 dY] in units of their own deviations, W_1 exact (offsets, signs of speeds)
+
+    1. rows of joint j times 1/t_j, t_j the torque noise; columns of W_2 times L^-T, L L' the mean covariance of the errors of a row
+    2. [W_1 W_2 L^-T Y] = Q [[R_11, R_12], [0, R_22]]                the rows project on what W_1 leaves: P = [W_2 L^-T Y] - Q_1 Q_1' [...]
+    3. R_22 = U S V', v the last column of V:  X_2 = -L^-T v_2 / v_Y,  X_1 = R_11^-1 (rest of Y - W_2 X_2)
+
+The covariance C_W of the errors of the columns comes from the filters and the sensitivities of the regressor (`runtime.perturbation`). Errors of
+different rows are taken alike, which they are not where a column is a product such as cos(q) qdd: the method stays approximate there. Without any
+noisy column it is least squares, weighted as `weights` says.
+
+With s_min the smallest singular value of R_22 and s_W that of its columns of W_2: no solution where s_min > 0.9 s_W (the errors assumed hide the
+parameters); doubtful where |v_Y| < 0.1 with v of norm 1.
+
+options: position_error, deviation of one raw position on the side cestac.side, rad or m; torque_error t_j, one or one per joint, N m, default from
+the residuals, t_j^2 = mean e_j^2 - X' C_j X; bootstrap (resampled blocks of time behind sigma; 0: that of least squares), seed, block, rank_tolerance.
+
+References: Golub and Van Loan (1980); Van Huffel and Vandewalle (1991), chapters 3 (mixed LS-TLS) and 10 (known error covariance).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from runtime.errors import SettingsError
+from runtime.estimate import Estimate
+from runtime.estimators import ols, wls
+from runtime.estimators.correlated import block_of_rows, default_block
+from runtime.estimators.linear import System, assemble
+from runtime.estimators.triangular import Array, triangularise
+from runtime.mapping import structure
+from runtime.model import GeneratedModel
+from runtime.observation import Observation
+from runtime.study import EstimateSettings
+
+HIDDEN = 0.9
+"""s_min / s_W from which the errors assumed explain the columns as well as the motion does."""
+DOUBTFUL = 0.1
+"""|v_Y| below which the solution leans on the smallest direction of W."""
+NOISY = 1e-12
+"""Error of a column over its norm below which it is exact."""
+PASSES = 3
+"""Passes that find the torque noise, from an estimate that needs none."""
+LEAST = 0.05
+"""Least torque noise, of the residual: where the errors assumed explain more than the residual."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """estimate.options of method tls."""
+
+    position_error: float
+    torque_error: float | tuple[float, ...] | None = None
+    bootstrap: int = 100
+    seed: int = 1
+    block: float | None = None
+    rank_tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.position_error < 0:
+            raise SettingsError(f"{self.position_error}; expected 0 or a positive deviation", path=("position_error",))
+        torque = self.torque_error if isinstance(self.torque_error, tuple) else (self.torque_error,)
+        if any(t is not None and not t > 0 for t in torque):
+            raise SettingsError(f"{self.torque_error}; expected positive deviations", path=("torque_error",))
+        if self.bootstrap == 1 or self.bootstrap < 0 or self.seed < 0:
+            raise SettingsError(
+                f"{self.bootstrap} runs, seed {self.seed}; expected 0 or at least 2 runs, and a seed from 0", path=("bootstrap",)
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Columns by their errors: numbers of the exact and of the noisy ones; C, shape (n, b, b), covariance of the errors of one row of joint j."""
+
+    exact: Array
+    noisy: Array
+    C: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """X, shape (b,), s_min, s_W and |v_Y| of one problem."""
+
+    X: Array
+    smallest: float
+    without: float
+    v: float
+
+
+def tls(
+    observation: Observation,
+    settings: EstimateSettings,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """The Estimate by total least squares; `details` holds the exact and the noisy columns, t_j, s_min and |v_Y|."""
+    options = tls_options(settings)
+    system = _linear(observation, settings, options)
+    free = system.solve()
+    if free.rank < len(system.names):
+        return assemble(replace(system, settings=settings), free, model=model, provenance=provenance)
+    seen = observation if system.names == observation.names else observation.columns(system.names)
+    split = split_columns(seen, options)
+    if not len(split.noisy):
+        found = assemble(replace(system, settings=settings), free, model=model, provenance=provenance)
+        return replace(found, details=_details(seen, split, np.array(system.scales), None))
+    t = torque_errors(seen, settings, split, options, adjusted(seen, split, np.array(system.scales)))
+    solved = total(factored(seen, split, t), split, error_root(seen, split, t))
+    if solved.smallest > HIDDEN * solved.without:
+        message = (
+            f"The errors assumed for the positions explain the columns as well as the motion does: s_min {solved.smallest:.3g} against {solved.without:.3g} "
+            "without Y. Total least squares has no usable solution; the values are those of least squares. Check estimate.options.position_error, "
+            "or use a richer motion or fewer columns."
+        )
+        return assemble(replace(system, settings=settings, status="ill-posed", message=message), free, model=model, provenance=provenance)
+    e = seen.Y - seen.W @ solved.X
+    residual = float(np.linalg.norm(e / np.repeat(system.scales, seen.rows)))
+    found = assemble(
+        replace(system, settings=settings), replace(free, X=solved.X, residual_norm=residual), model=model, provenance=provenance
+    )
+    message = found.message
+    if solved.v < DOUBTFUL:
+        message = (
+            f"{message} |v_Y| = {solved.v:.2g}: the solution leans on the direction in which W is weakest; compare it with wls.".strip()
+        )
+    found = replace(found, message=message, details=_details(seen, split, t, solved))
+    if not options.bootstrap:
+        return found
+    C = bootstrap_covariance(seen, split, t, options)
+    sigma = np.sqrt(np.diag(C))
+    return replace(found, covariance=C, sigma=sigma, sigma_corrected=sigma)
+
+
+def tls_options(settings: EstimateSettings) -> Options:
+    """Checked estimate.options; the deviation of the positions has no default."""
+    if "position_error" not in settings.options:
+        message = "missing; tls needs the deviation of one raw position, rad or m on the side cestac.side (a step Delta rounded to the nearest: Delta/sqrt(12))"
+        raise SettingsError(message, path=("estimate", "options", "position_error"))
+    return structure(Options, settings.options, ("estimate", "options"))
+
+
+def split_columns(seen: Observation, options: Options) -> Split:
+    """Exact and noisy columns, from seen.errors; all exact where the positions are."""
+    b = len(seen.names)
+    if options.position_error == 0:
+        return Split(np.arange(b), np.arange(0), np.zeros((seen.n, b, b)))
+    if seen.errors is None:
+        raise SettingsError(
+            "this observation does not know the errors of its columns; make it with runtime.perturbation.with_errors",
+            path=("estimate", "method"),
+        )
+    error = np.sqrt(np.einsum("j,jaa->a", np.asarray(seen.rows, dtype=float), seen.errors))
+    noisy = error > NOISY * np.linalg.norm(seen.W, axis=0)
+    return Split(np.flatnonzero(~noisy), np.flatnonzero(noisy), seen.errors)
+
+
+def torque_errors(seen: Observation, settings: EstimateSettings, split: Split, options: Options, X: Array) -> Array:
+    """t_j, shape (n,): as given, or t_j^2 = mean e_j^2 - X'C_j X at the solution; one for all joints without weights."""
+    if options.torque_error is not None:
+        given = (
+            np.broadcast_to(np.asarray(options.torque_error, dtype=float), (seen.n,))
+            if np.size(options.torque_error) in (1, seen.n)
+            else None
+        )
+        if given is None:
+            message = f"{np.size(options.torque_error)} values; expected one or {seen.n}, one per joint"
+            raise SettingsError(message, path=("estimate", "options", "torque_error"))
+        return np.array(given)
+    share = max(1 - len(X) / sum(seen.rows), 1 / sum(seen.rows))
+    t = np.ones(seen.n)
+    for _ in range(PASSES):
+        squares = np.array([np.sum((seen.Y - seen.W @ X)[seen.joint(j)] ** 2) for j in range(seen.n)])
+        own = np.array([X @ split.C[j] @ X for j in range(seen.n)])
+        N = np.asarray(seen.rows, dtype=float)
+        if settings.weights == "none":
+            squares, own, N = (np.full(seen.n, value) for value in (squares.sum(), N @ own / N.sum(), N.sum()))
+        variance = squares / np.maximum(N * share, 1)
+        t = np.sqrt(np.maximum(variance - own, LEAST**2 * variance))
+        t = np.where(t > 0, t, 1.0)
+        solved = total(factored(seen, split, t), split, error_root(seen, split, t))
+        if solved.smallest > HIDDEN * solved.without:
+            break
+        X = solved.X
+    return t
+
+
+def adjusted(seen: Observation, split: Split, scales: Array) -> Array:
+    """X = (sum_j (W_j'W_j - N_j C_j) / s_j^2)^-1 sum_j W_j'Y_j / s_j^2, shape (b,): the errors of the columns taken off, no torque noise needed."""
+    row = np.repeat(scales, seen.rows)
+    A = np.einsum("j,jab->ab", -np.asarray(seen.rows, dtype=float) / scales**2, split.C) + (W := seen.W / row[:, None]).T @ W
+    return np.asarray(np.linalg.lstsq(A, W.T @ (seen.Y / row), rcond=None)[0])
+
+
+def error_root(seen: Observation, split: Split, t: Array) -> Array:
+    """L of the noisy columns, shape (b_2, b_2): L L' the mean covariance of the errors of a row after the rows of joint j were divided by t_j."""
+    share = np.asarray(seen.rows, dtype=float) / sum(seen.rows) / t**2
+    C = np.einsum("j,jab->ab", share, split.C)[np.ix_(split.noisy, split.noisy)]
+    deviation = np.sqrt(np.diag(C))
+    values, vectors = np.linalg.eigh(C / np.outer(deviation, deviation))
+    values = np.maximum(values, NOISY * values[-1])
+    return triangularise((deviation[:, None] * vectors * np.sqrt(values)).T).T
+
+
+def factored(seen: Observation, split: Split, t: Array) -> Array:
+    """Triangular factor of the rows [W_1 W_2 Y] over t_j, shape (b + 1, b + 1)."""
+    return triangularise(_rows(seen, split, t))
+
+
+def total(R: Array, split: Split, L: Array) -> Solved:
+    """Mixed least squares and total least squares from the factor of [W_1 W_2 Y]."""
+    b1, b2 = len(split.exact), len(split.noisy)
+    into = np.eye(b2 + 1)
+    into[:b2, :b2] = np.linalg.inv(L).T
+    R22 = R[b1:, b1:] @ into
+    s, Vt = np.linalg.svd(R22)[1:]
+    v = Vt[-1]
+    X = np.zeros(b1 + b2)
+    if v[-1] != 0:
+        X[split.noisy] = into[:b2, :b2] @ (-v[:b2] / v[-1])
+        X[split.exact] = solve_triangular(R[:b1, :b1], R[:b1, -1] - R[:b1, b1:-1] @ X[split.noisy]) if b1 else 0.0
+    return Solved(X, float(s[-1]), float(np.linalg.svd(R22[:, :b2], compute_uv=False)[-1]), float(abs(v[-1])))
+
+
+def bootstrap_covariance(seen: Observation, split: Split, t: Array, options: Options) -> Array:
+    """Covariance of X over resampled blocks of time, shape (b, b), from one triangular factor per block."""
+    A, L = _rows(seen, split, t), error_root(seen, split, t)
+    blocks = block_of_rows(seen, default_block(seen) if options.block is None else options.block)
+    count = int(blocks.max()) + 1
+    factors = [triangularise(A[blocks == k]) for k in range(count)]
+    rng = np.random.default_rng(options.seed)
+    found = [
+        total(triangularise(np.vstack([factors[k] for k in rng.integers(count, size=count)])), split, L).X for _ in range(options.bootstrap)
+    ]
+    return np.atleast_2d(np.cov(np.array(found), rowvar=False))
+
+
+def _rows(seen: Observation, split: Split, t: Array) -> Array:
+    order = [*split.exact, *split.noisy]
+    return np.asarray(np.column_stack([seen.W[:, order], seen.Y]) / np.repeat(t, seen.rows)[:, None])
+
+
+def _linear(observation: Observation, settings: EstimateSettings, options: Options) -> System:
+    """Least squares of the same rows, weighted as `weights` says."""
+    given = {"block": options.block, "rank_tolerance": options.rank_tolerance}
+    linear = {key: value for key, value in given.items() if value is not None}
+    if settings.weights == "covariance":
+        raise SettingsError("'covariance'; tls weighs joints, use none, joint or iterated", path=("estimate", "weights"))
+    if settings.weights == "none":
+        return ols.system(observation, replace(settings, method="ols", options=linear))
+    return wls.system(observation, replace(settings, method="wls", options=linear))
+
+
+def _details(seen: Observation, split: Split, t: Array, solved: Solved | None) -> dict[str, Any]:
+    return {
+        "exact": [seen.names[i] for i in split.exact],
+        "noisy": [seen.names[i] for i in split.noisy],
+        "torque_error": t,
+        "s_min": None if solved is None else solved.smallest,
+        "s_min_without_Y": None if solved is None else solved.without,
+        "v_Y": None if solved is None else solved.v,
+    }
