@@ -1,6 +1,7 @@
 /* Inner loops of identification and of resolution studies, for any robot whose C file gives its distinct signals.
 
-    fused_states      median-filtered positions -> q, qd, qdd: low-pass forward and backward, central differences (runtime/signals.py)
+    fused_states      median-filtered positions -> q, qd: low-pass forward and backward, central differences (runtime/signals.py)
+    fused_gather      rows of q, qd, qdd from these
     fused_decimated   states -> signals -> kept samples of the zero-phase decimation (runtime/decimation.py); the signals are never stored
     fused_normal      rows -> A_j = [W_j Y_j]'[W_j Y_j] of every joint on its own columns
     fused_residual    rows, X -> W_j'(Y_j - W_j X) and ||Y_j - W_j X||^2: one refinement
@@ -49,25 +50,28 @@ struct lowpass {
     const double *sos, *zi;
 };
 
-/* Positions, given[t*sample + j*joint], to states (n, N). scratch: 2 (N + 2 pad) LANES. ends: 1 one-sided, 2 of second order. */
+/* Positions, given[t*sample + j*joint], and filtered positions and velocities, in groups of LANES joints: (groups, N + 2 pad, LANES), the N
+samples in the middle. pad: the larger one of the two filters. ends: differences there are 1 one-sided, 2 of second order. */
 struct states {
-    int64_t N, n, sample, joint, ends;
+    int64_t N, n, sample, joint, pad, ends;
     double rate;
     struct lowpass on_q, on_qd;
     const double *given;
-    double *scratch, *q, *qd, *qdd;
+    double *q, *qd;
 };
 
-/* Signals of the robot from states (n, stride), S of them wanted: rows wanted[s] of U, which has `count` rows of `length` samples. */
+/* Signals of the robot: of `count`, S are wanted. They are evaluated TILE = `tile` samples at a time: sample p of a block of samples is
+U[(p/tile*count + s)*tile + p%tile], up to p = length - 1. rows (3, n, tile) is scratch. */
 struct source {
     signals_of *signals;
-    const double *constants, *q, *qd, *qdd;
-    int64_t stride, count, S, length;
+    const double *constants;
+    int64_t count, S, tile, length;
     const int32_t *wanted;
-    double *U;
+    double *U, *rows;
 };
 
-/* Zero-phase decimation of N samples by the matrices of runtime/decimation.py: blocks of L samples from `phase` on, each of G kept ones.
+/* Zero-phase decimation of N samples from `begin` on by the matrices of runtime/decimation.py: blocks of L samples from `phase` on, each of G
+kept ones, of which `most` are evaluated together.
 
     x_0 = start' u(first samples)     [x_(b+1); d_b; e_b] = block' [u_b; x_b]                       b = 0 .. blocks - 1
     [v_(b-1); y_b] = [d_b; e_b] + back' v_b     with [v; y] of the last samples = end' [u(last samples); x_blocks]
@@ -76,7 +80,7 @@ start (first, STATE), block (L + STATE, 3 STATE), back (STATE, 2 STATE), end (fi
 states. d (blocks, S, 2 STATE), x (S, STATE); y (S, ystride) receives the kept samples, `rest` of them from the last samples.
 */
 struct decimation {
-    int64_t N, phase, L, G, blocks, first, final, rest, ystride;
+    int64_t begin, N, phase, L, G, blocks, most, first, final, rest, ystride;
     const double *start, *block, *back, *end;
     double *d, *x, *y;
 };
@@ -105,18 +109,19 @@ struct rows {
 enum task { NORMAL, RESIDUAL, ROWS };
 
 int32_t fused_states(const struct states *a);
-int32_t fused_decimated(const struct source *from, const struct decimation *a);
+int32_t fused_gather(const struct states *a, int64_t t, int64_t m, double *q, double *qd, double *qdd, int64_t stride);
+int32_t fused_decimated(const struct states *states, const struct source *from, const struct decimation *a);
 int32_t fused_normal(const struct entries *a, const struct rows *r);
 int32_t fused_residual(const struct entries *a, const struct rows *r, const double *X);
 int32_t fused_rows(const struct entries *a, const struct rows *r);
-int32_t fused_stream(int32_t task, const struct source *from, const struct entries *a, const struct rows *r, int64_t N, int64_t step,
+int32_t fused_stream(int32_t task, const struct source *from, const struct entries *a, int64_t N, int64_t step, int64_t ustride,
                      const double *const given[4], const double *X);
 int32_t fused_abi(void);
 void fused_layout(int64_t layout[8]);
 
 /* The sums of products for one width of vectors. */
 struct kernels {
-    void (*block)(const struct decimation *a, const struct source *from, const double *U, double *d);
+    void (*block)(const struct decimation *a, const struct source *from, int64_t p, double *d);
     void (*begin)(const struct decimation *a, const struct source *from);
     void (*finish)(const struct decimation *a, const struct source *from);
     void (*backward)(const struct decimation *a, int64_t S);
@@ -205,80 +210,108 @@ static void zero_phase(double *x, int64_t N, const struct lowpass *f)
     pass(x + (N - 1 + f->pad)*LANES, R, -LANES, f);
 }
 
-/* dx, central differences inside; N > ends. */
-PLAIN static void difference(const double *restrict x, double *restrict dx, int64_t N, double rate, int64_t ends)
+/* One sample of the difference. */
+INLINE void slope(const double *x, int64_t t, int64_t N, double h, int64_t ends, double *restrict dx)
 {
-    const double h = 1.0/rate;
-    for (int64_t i = LANES; i < (N - 1)*LANES; i++)
-        dx[i] = (x[i + LANES] - x[i - LANES])/(2.0*h);
-    const double *last = x + (N - 1)*LANES;
+    const double *now = x + t*LANES;
     for (int l = 0; l < LANES; l++)
-        if (ends == 1) {
-            dx[l] = (x[LANES + l] - x[l])/h;
-            dx[(N - 1)*LANES + l] = (last[l] - last[l - LANES])/h;
-        } else {
-            dx[l] = -1.5/h*x[l] + 2.0/h*x[LANES + l] + -0.5/h*x[2*LANES + l];
-            dx[(N - 1)*LANES + l] = 0.5/h*last[l - 2*LANES] + -2.0/h*last[l - LANES] + 1.5/h*last[l];
-        }
+        if (t > 0 && t < N - 1)
+            dx[l] = (now[l + LANES] - now[l - LANES])/(2.0*h);
+        else if (ends == 1)
+            dx[l] = t ? (now[l] - now[l - LANES])/h : (now[l + LANES] - now[l])/h;
+        else if (t)
+            dx[l] = 0.5/h*now[l - 2*LANES] + -2.0/h*now[l - LANES] + 1.5/h*now[l];
+        else
+            dx[l] = -1.5/h*now[l] + 2.0/h*now[l + LANES] + -0.5/h*now[l + 2*LANES];
 }
 
-/* `used` lanes of N samples to rows N apart. */
-static void rows_of(const double *x, int64_t N, int64_t used, double *row)
+PLAIN static void difference(const double *x, double *dx, int64_t N, double rate, int64_t ends)
 {
     for (int64_t t = 0; t < N; t++)
-        for (int64_t l = 0; l < used; l++)
-            row[l*N + t] = x[t*LANES + l];
+        slope(x, t, N, 1.0/rate, ends, dx + t*LANES);
 }
 
 int32_t fused_states(const struct states *a)
 {
-    const int64_t N = a->N, n = a->n;
-    const int64_t pad = a->on_q.pad > a->on_qd.pad ? a->on_q.pad : a->on_qd.pad;
-    if (n < 1 || a->ends < 1 || a->ends > 2 || N <= a->ends || pad < 0 || N <= pad || a->on_q.sections > MOST || a->on_qd.sections > MOST)
+    const int64_t N = a->N, n = a->n, size = (N + 2*a->pad)*LANES;
+    if (n < 1 || a->ends < 1 || a->ends > 2 || N <= a->ends || N <= a->pad || a->on_q.pad > a->pad || a->on_qd.pad > a->pad
+        || a->on_q.sections > MOST || a->on_qd.sections > MOST)
         return 1;
-    double *x = a->scratch + pad*LANES, *dx = x + (N + 2*pad)*LANES;
-    for (int64_t j = 0; j < n; j += LANES) {
+    for (int64_t j = 0, group = 0; j < n; j += LANES, group += size) {
+        double *x = a->q + group + a->pad*LANES, *dx = a->qd + group + a->pad*LANES;
         const int64_t used = n - j < LANES ? n - j : LANES;
         for (int64_t t = 0; t < N; t++)
             for (int64_t l = 0; l < LANES; l++)
                 x[t*LANES + l] = l < used ? a->given[t*a->sample + (j + l)*a->joint] : 0.0;
         if (a->on_q.sections)
             zero_phase(x, N, &a->on_q);
-        rows_of(x, N, used, a->q + j*N);
         difference(x, dx, N, a->rate, a->ends);
         if (a->on_qd.sections)
             zero_phase(dx, N, &a->on_qd);
-        rows_of(dx, N, used, a->qd + j*N);
-        difference(dx, x, N, a->rate, a->ends);
-        rows_of(x, N, used, a->qdd + j*N);
     }
+    return 0;
+}
+
+/* Samples t .. t + m - 1 of q, qd and qdd, rows `stride` apart. */
+PLAIN static void gather(const struct states *a, int64_t t, int64_t m, double *q, double *qd, double *qdd, int64_t stride)
+{
+    const double h = 1.0/a->rate;
+    for (int64_t j = 0; j < a->n; j += LANES) {
+        const int64_t group = j/LANES*(a->N + 2*a->pad)*LANES + a->pad*LANES, used = a->n - j < LANES ? a->n - j : LANES;
+        const double *x = a->q + group, *dx = a->qd + group;
+        for (int64_t i = 0; i < m; i++) {
+            double ddx[LANES];
+            slope(dx, t + i, a->N, h, a->ends, ddx);
+            for (int64_t l = 0; l < used; l++) {
+                q[(j + l)*stride + i] = x[(t + i)*LANES + l];
+                qd[(j + l)*stride + i] = dx[(t + i)*LANES + l];
+                qdd[(j + l)*stride + i] = ddx[l];
+            }
+        }
+    }
+}
+
+int32_t fused_gather(const struct states *a, int64_t t, int64_t m, double *q, double *qd, double *qdd, int64_t stride)
+{
+    if (t < 0 || m < 0 || t + m > a->N || stride < m)
+        return 1;
+    gather(a, t, m, q, qd, qdd, stride);
     return 0;
 }
 
 /* --------------------------------------------------------------------------------------------------------------------- decimation */
 
-static int32_t evaluate(const struct source *a, int64_t t, int64_t m)
+/* The signals of samples t .. t + m - 1. */
+static int32_t evaluate(const struct states *states, const struct source *a, int64_t t, int64_t m)
 {
-    return m > a->length || a->signals(m, a->q + t, a->qd + t, a->qdd + t, a->stride, a->constants, a->U, a->length) ? 2 : 0;
+    double *q = a->rows, *qd = q + states->n*a->tile, *qdd = qd + states->n*a->tile;
+    for (int64_t p = 0; p < m; p += a->tile) {
+        const int64_t part = m - p < a->tile ? m - p : a->tile;
+        gather(states, t + p, part, q, qd, qdd, a->tile);
+        if (a->signals(part, q, qd, qdd, a->tile, a->constants, a->U + p*a->count, a->tile))
+            return 2;
+    }
+    return 0;
 }
 
-int32_t fused_decimated(const struct source *from, const struct decimation *a)
+int32_t fused_decimated(const struct states *states, const struct source *from, const struct decimation *a)
 {
-    const int64_t most = from->length/a->L, kept = a->blocks*a->G + a->rest;
-    if (a->G < 1 || a->G > STATE || a->rest > STATE || a->first > a->N || a->final > a->N || (a->blocks && !most) || a->ystride < kept)
+    const int64_t kept = a->blocks*a->G + a->rest, longest = a->most*a->L > a->first ? a->most*a->L : a->first;
+    if (a->begin < 0 || a->begin + a->N > states->N || a->G < 1 || a->G > STATE || a->rest > STATE || a->most < 1 || longest > from->length
+        || a->final > from->length || a->first > a->N || a->final > a->N || a->phase + a->blocks*a->L > a->N || a->ystride < kept)
         return 1;
     const struct kernels *const use = best();
-    int32_t status = evaluate(from, 0, a->first);
+    int32_t status = evaluate(states, from, a->begin, a->first);
     if (!status)
         use->begin(a, from);
-    for (int64_t b = 0; b < a->blocks && !status; b += most) {
-        const int64_t some = a->blocks - b < most ? a->blocks - b : most;
-        status = evaluate(from, a->phase + b*a->L, some*a->L);
+    for (int64_t b = 0; b < a->blocks && !status; b += a->most) {
+        const int64_t some = a->blocks - b < a->most ? a->blocks - b : a->most;
+        status = evaluate(states, from, a->begin + a->phase + b*a->L, some*a->L);
         for (int64_t i = 0; i < some && !status; i++)
-            use->block(a, from, from->U + i*a->L, a->d + (b + i)*from->S*2*STATE);
+            use->block(a, from, i*a->L, a->d + (b + i)*from->S*2*STATE);
     }
     if (!status)
-        status = evaluate(from, a->N - a->final, a->final);
+        status = evaluate(states, from, a->begin + a->N - a->final, a->final);
     if (status)
         return status;
     use->finish(a, from);
@@ -289,7 +322,7 @@ int32_t fused_decimated(const struct source *from, const struct decimation *a)
 /* ------------------------------------------------------------------------------------------------------------------ least squares */
 
 /* The rows of joint j that are used, signs applied, torque last: `out` (width, stride); returns their number. */
-static int64_t gather(const struct entries *a, const struct rows *r, int64_t j, int64_t t, int64_t m, double *out, int64_t stride)
+static int64_t used_rows(const struct entries *a, const struct rows *r, int64_t j, int64_t t, int64_t m, double *out, int64_t stride)
 {
     const uint8_t *mask = r->mask ? r->mask + j*r->mstride + t : NULL;
     const int64_t c = a->from[j + 1] - a->from[j];
@@ -323,10 +356,10 @@ static void work(enum task task, const struct entries *a, const struct rows *r, 
         for (int64_t t = 0; t < r->m; t += SPAN) {
             const int64_t m = r->m - t < SPAN ? r->m - t : SPAN;
             if (task == ROWS) {
-                a->taken[j] += gather(a, r, j, t, m, R + c + 1 + a->taken[j], c + 1 + a->most);
+                a->taken[j] += used_rows(a, r, j, t, m, R + c + 1 + a->taken[j], c + 1 + a->most);
                 continue;
             }
-            const int64_t count = gather(a, r, j, t, m, a->O, APART), full = (count + WHOLE - 1)/WHOLE*WHOLE;
+            const int64_t count = used_rows(a, r, j, t, m, a->O, APART), full = (count + WHOLE - 1)/WHOLE*WHOLE;
             for (int64_t k = 0; k <= c; k++)
                 memset(a->O + k*APART + count, 0, (size_t)(full - count)*sizeof *a->O);
             for (int64_t k = c + 1; k < width; k++)
@@ -363,24 +396,22 @@ int32_t fused_residual(const struct entries *a, const struct rows *r, const doub
     return 0;
 }
 
-/* The same tasks, or the rows for a QR, on N samples of states and torques given (N, n), `step` at a time. q, qd, qdd of `from` and Y of `r`
-are scratch, (n, from->stride), here. */
-int32_t fused_stream(int32_t task, const struct source *from, const struct entries *a, const struct rows *r, int64_t N,
-                     int64_t step, const double *const given[4], const double *X)
+/* The same tasks, or the rows for a QR, on N samples of states and torques given (N, n), `step` at a time: from->U is (count, ustride) here,
+from->rows (4, n, ustride), with room for `step` samples. */
+int32_t fused_stream(int32_t task, const struct source *from, const struct entries *a, int64_t N, int64_t step, int64_t ustride,
+                     const double *const given[4], const double *X)
 {
-    double *const to[4] = {(double *)(uintptr_t)from->q, (double *)(uintptr_t)from->qd, (double *)(uintptr_t)from->qdd,
-                           (double *)(uintptr_t)r->Y};
-    if (task < NORMAL || task > ROWS || N < 0 || step < 1 || from->stride < step || (task == ROWS && N > a->most))
+    if (task < NORMAL || task > ROWS || N < 0 || step < 1 || ustride < step || (task == ROWS && N > a->most))
         return 1;
     for (int64_t t = 0; t < N; t += step) {
-        const int64_t m = N - t < step ? N - t : step;
+        const int64_t m = N - t < step ? N - t : step, size = a->n*ustride;
         for (int k = 0; k < 4; k++)
             for (int64_t i = 0; i < m; i++)
                 for (int64_t j = 0; j < a->n; j++)
-                    to[k][j*from->stride + i] = given[k][(t + i)*a->n + j];
-        if (evaluate(from, 0, m))
+                    from->rows[k*size + j*ustride + i] = given[k][(t + i)*a->n + j];
+        if (from->signals(m, from->rows, from->rows + size, from->rows + 2*size, ustride, from->constants, from->U, ustride))
             return 2;
-        const struct rows part = {m, from->length, from->stride, r->mstride, from->U, r->Y, r->mask ? r->mask + t : NULL};
+        const struct rows part = {m, ustride, ustride, 0, from->U, from->rows + 3*size, NULL};
         work((enum task)task, a, &part, X);
     }
     return 0;
@@ -417,46 +448,56 @@ TARGET INLINE void NAME(product)(const double *const *u, int64_t length, const d
         }
 }
 
-/* One block of `signals` signals: what the way back needs, d, and the next state, x. */
-TARGET INLINE void NAME(forward)(const struct decimation *a, const double *const *u, double *x, double *d, const int signals)
+/* sum += M' u for the wanted signals s, s + 1, ... at samples p .. p + length - 1, tile by tile. */
+TARGET INLINE void NAME(over_tiles)(const struct source *from, int64_t s, int64_t p, int64_t length, const double *M, NAME(V) *sum,
+                                    const int signals, const int outs)
 {
-    NAME(V) sum[TOGETHER*3*STATE/WIDTH];
-    const double *state[TOGETHER];
-    memset(sum, 0, sizeof sum);
-    for (int s = 0; s < signals; s++)
-        state[s] = x + s*STATE;
-    NAME(product)(u, a->L, a->block, sum, signals, 3*STATE);
-    NAME(product)(state, STATE, a->block + a->L*3*STATE, sum, signals, 3*STATE);
-    for (int s = 0; s < signals; s++) {
-        memcpy(x + s*STATE, sum + s*3*STATE/WIDTH, STATE*sizeof *x);
-        memcpy(d + s*2*STATE, sum + (3*s + 1)*STATE/WIDTH, 2*STATE*sizeof *d);
+    const double *u[TOGETHER];
+    while (length > 0) {
+        const int64_t start = p%from->tile, left = from->tile - start, part = left < length ? left : length;
+        for (int i = 0; i < signals; i++)
+            u[i] = from->U + (p/from->tile*from->count + from->wanted[s + i])*from->tile + start;
+        NAME(product)(u, part, M, sum, signals, outs);
+        p += part;
+        length -= part;
+        M += part*outs;
     }
 }
 
-/* One block of every signal; U is its first sample, d its part. */
-TARGET static void NAME(block)(const struct decimation *a, const struct source *from, const double *U, double *d)
+/* One block of `signals` signals from sample p on: what the way back needs, d, and the next state, x. */
+TARGET INLINE void NAME(forward)(const struct decimation *a, const struct source *from, int64_t s, int64_t p, double *d, const int signals)
 {
-    const double *u[TOGETHER];
+    NAME(V) sum[TOGETHER*3*STATE/WIDTH];
+    const double *state[TOGETHER];
+    double *x = a->x + s*STATE;
+    memset(sum, 0, sizeof sum);
+    for (int i = 0; i < signals; i++)
+        state[i] = x + i*STATE;
+    NAME(over_tiles)(from, s, p, a->L, a->block, sum, signals, 3*STATE);
+    NAME(product)(state, STATE, a->block + a->L*3*STATE, sum, signals, 3*STATE);
+    for (int i = 0; i < signals; i++) {
+        memcpy(x + i*STATE, sum + i*3*STATE/WIDTH, STATE*sizeof *x);
+        memcpy(d + (s + i)*2*STATE, sum + (3*i + 1)*STATE/WIDTH, 2*STATE*sizeof *d);
+    }
+}
+
+/* One block of every signal, from sample p on; d is its part. */
+TARGET static void NAME(block)(const struct decimation *a, const struct source *from, int64_t p, double *d)
+{
     int64_t s = 0;
-    for (; s + TOGETHER <= from->S; s += TOGETHER) {
-        for (int i = 0; i < TOGETHER; i++)
-            u[i] = U + from->wanted[s + i]*from->length;
-        NAME(forward)(a, u, a->x + s*STATE, d + s*2*STATE, TOGETHER);
-    }
-    for (; s < from->S; s++) {
-        u[0] = U + from->wanted[s]*from->length;
-        NAME(forward)(a, u, a->x + s*STATE, d + s*2*STATE, 1);
-    }
+    for (; s + TOGETHER <= from->S; s += TOGETHER)
+        NAME(forward)(a, from, s, p, d, TOGETHER);
+    for (; s < from->S; s++)
+        NAME(forward)(a, from, s, p, d, 1);
 }
 
 /* The steady state of the padding, and what comes before the first kept sample. */
 TARGET static void NAME(begin)(const struct decimation *a, const struct source *from)
 {
     for (int64_t s = 0; s < from->S; s++) {
-        const double *u = from->U + from->wanted[s]*from->length;
         NAME(V) sum[STATE/WIDTH];
         memset(sum, 0, sizeof sum);
-        NAME(product)(&u, a->first, a->start, sum, 1, STATE);
+        NAME(over_tiles)(from, s, 0, a->first, a->start, sum, 1, STATE);
         memcpy(a->x + s*STATE, sum, sizeof sum);
     }
 }
@@ -465,10 +506,10 @@ TARGET static void NAME(begin)(const struct decimation *a, const struct source *
 TARGET static void NAME(finish)(const struct decimation *a, const struct source *from)
 {
     for (int64_t s = 0; s < from->S; s++) {
-        const double *u = from->U + from->wanted[s]*from->length, *x = a->x + s*STATE;
+        const double *x = a->x + s*STATE;
         NAME(V) sum[2*STATE/WIDTH];
         memset(sum, 0, sizeof sum);
-        NAME(product)(&u, a->final, a->end, sum, 1, 2*STATE);
+        NAME(over_tiles)(from, s, 0, a->final, a->end, sum, 1, 2*STATE);
         NAME(product)(&x, STATE, a->end + a->final*2*STATE, sum, 1, 2*STATE);
         memcpy(a->x + s*STATE, sum, STATE*sizeof *a->x);
         memcpy(a->y + s*a->ystride + a->blocks*a->G, sum + STATE/WIDTH, (size_t)a->rest*sizeof *a->y);

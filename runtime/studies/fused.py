@@ -1,8 +1,8 @@
 """The fused C kernels of studies (fused.c), compiled on first use: filters, decimation and least squares around the signals of a robot in C.
 
-    states(q, rate, signals, room)                          as runtime.signals.filtered_states, joints by samples
+    FilteredStates(q, rate, signals, room)                  as runtime.signals.filtered_states
     Entries(model, names)                                   which signals stand where in the wanted columns
-    decimated(model, entries, states, samples, ...)         kept samples of the wanted signals; the signals are not stored
+    decimated(entries, states, samples, ...)                kept samples of the wanted signals; the signals are not stored
 
 Least squares on these rows, and on states that are streamed: `runtime.studies.fused_reductions`.
 
@@ -35,7 +35,7 @@ SOURCE = Path(__file__).with_name("fused.c")
 FUSED_FLAGS = tuple({"-O2": "-O3", "-ffp-contract=off": "-ffp-contract=fast"}.get(flag, flag) for flag in FLAGS)
 ABI = 1
 LANES, SIDE, SPAN, STATE = 8, 4, 512, 8  # of fused.c; LANES is 1 without vector types
-TILES = 320  # samples of signals evaluated at a time, at least: these stay in cache
+TOGETHER = 640  # most samples of signals evaluated together, except where one block is longer: these stay in cache
 REFUSALS = {1: "arguments that do not fit each other", 2: "a block that the signals of the robot refuse"}
 
 
@@ -54,24 +54,24 @@ class StatesStructure(ctypes.Structure):
     """struct states."""
 
     _fields_ = [
-        *_fields("N n sample joint ends"),
+        *_fields("N n sample joint pad ends"),
         ("rate", ctypes.c_double),
         ("on_q", LowpassStructure),
         ("on_qd", LowpassStructure),
-        *_fields(pointers="given scratch q qd qdd"),
+        *_fields(pointers="given q qd"),
     ]
 
 
 class SourceStructure(ctypes.Structure):
     """struct source."""
 
-    _fields_ = [*_fields(pointers="signals constants q qd qdd"), *_fields("stride count S length", "wanted U")]
+    _fields_ = [*_fields(pointers="signals constants"), *_fields("count S tile length", "wanted U rows")]
 
 
 class DecimationStructure(ctypes.Structure):
     """struct decimation."""
 
-    _fields_ = _fields("N phase L G blocks first final rest ystride", "start block back end d x y")
+    _fields_ = _fields("begin N phase L G blocks most first final rest ystride", "start block back end d x y")
 
 
 class EntriesStructure(ctypes.Structure):
@@ -105,7 +105,7 @@ def _opened(path: Path) -> ctypes.CDLL:
         abi = found.fused_abi()
         found.fused_layout.restype = None
         found.fused_layout(layout)
-        for name in ("states", "decimated", "normal", "residual", "rows", "stream"):
+        for name in ("states", "gather", "decimated", "normal", "residual", "rows", "stream"):
             getattr(found, f"fused_{name}").restype = ctypes.c_int32
     except AttributeError as e:
         raise NotCompiledError(f"{SOURCE.name} is not the one of this version: {e}") from e
@@ -154,21 +154,29 @@ def _lowpass(low: Lowpass | None, name: str, rate: float) -> tuple[LowpassStruct
     return LowpassStructure(len(sos), pad, address(sos), address(zi)), sos, zi
 
 
-def states(q: Array, rate: float, signals: SignalSettings, room: Room) -> tuple[Array, Array, Array]:
-    """q, qd, qdd, shape (n, N) each, of measured positions q, shape (N, n): median, low-pass, difference, low-pass, difference.
+class FilteredStates:
+    """q, qd, qdd of measured positions q, shape (N, n): median, low-pass, difference, low-pass, difference. As C keeps them, in `room`."""
 
-    The arrays are those of `room`: valid until it is used for other states.
-    """
-    given = np.asarray(median_filtered(q, signals.median), dtype=float)
-    N, n = given.shape
-    (on_q, *_), (on_qd, *_) = (_lowpass(signals.lowpass, name, rate) for name in ("q", "qd"))
-    pad, ends = max(on_q.pad, on_qd.pad), 1 if signals.ends == "one-sided" else 2
-    require_longer(N, max(pad, ends))
-    scratch = room.array("scratch", 2 * (N + 2 * pad) * LANES)
-    found = tuple(room.array(name, n, N) for name in ("q", "qd", "qdd"))
-    steps = [step // given.itemsize for step in given.strides]
-    call("states", ctypes.byref(StatesStructure(N, n, *steps, ends, rate, on_q, on_qd, *map(address, (given, scratch, *found)))))
-    return found[0], found[1], found[2]
+    def __init__(self, q: Array, rate: float, signals: SignalSettings, room: Room) -> None:
+        given = np.asarray(median_filtered(q, signals.median), dtype=float)
+        self.N, self.n = given.shape
+        (on_q, *_), (on_qd, *_) = (_lowpass(signals.lowpass, name, rate) for name in ("q", "qd"))
+        pad, ends = max(on_q.pad, on_qd.pad), 1 if signals.ends == "one-sided" else 2
+        require_longer(self.N, max(pad, ends))
+        groups = -(-self.n // LANES)
+        lanes = room.array("lanes", 2, groups, self.N + 2 * pad, LANES)
+        steps = [step // given.itemsize for step in given.strides]
+        pointers = address(given), address(lanes[0]), address(lanes[1])
+        self.lanes, self.structure = lanes, StatesStructure(self.N, self.n, *steps, pad, ends, rate, on_q, on_qd, *pointers)
+        call("states", ctypes.byref(self.structure))
+
+    def rows(self, samples: slice) -> Array:
+        """q, qd, qdd of these samples, shape (3, n, samples)."""
+        m = samples.stop - samples.start
+        found = np.empty((3, self.n, m))
+        pointers = [ctypes.c_void_p(address(x)) for x in found]
+        call("gather", ctypes.byref(self.structure), *map(ctypes.c_int64, (samples.start, m)), *pointers, ctypes.c_int64(m))
+        return found
 
 
 class Entries:
@@ -216,45 +224,39 @@ def _matrices(p: Plan) -> tuple[Array, Array, Array, Array]:
 
 
 def decimated(
-    entries: Entries,
-    states: tuple[Array, Array, Array],
-    samples: slice,
-    factor: int,
-    settings: Decimate | None,
-    constants: Array,
-    room: Room,
+    entries: Entries, states: FilteredStates, samples: slice, factor: int, settings: Decimate | None, constants: Array, room: Room
 ) -> Array:
     """The kept samples of the wanted signals, shape (S, K): row i is signal entries.wanted[i].
 
-    states : q, qd, qdd, shape (n, N) each, as `states` gives them, of which `samples` are used.   constants : of `constant_values`.
-    The result is one of `room`.
+    samples : those used of the states.   constants : of `constant_values`.   The result is one of `room`.
     """
     p = decimation_plan(samples.stop - samples.start, factor, settings)
     if p is None:
         return _every_sample(entries, states, samples, constants, room)
     table, S = entries.model.signals, len(entries.wanted)
-    length = max(len(p.X0), len(p.A), p.L * max(1, round(TILES / p.L))) + 8
-    U, y = room.array("U", table.count, length), room.array("y", S, p.K)
-    d, x = room.array("d", p.blocks, S, 2 * STATE), room.array("x", S, STATE)
-    started = [address(state) + 8 * samples.start for state in states]
-    source = SourceStructure(
-        table.address, address(constants), *started, states[0].shape[1], table.count, S, length, address(entries.wanted), address(U)
-    )
-    plan = DecimationStructure(
-        p.N, p.phase, p.L, p.G, p.blocks, len(p.X0), len(p.A), p.K - p.blocks * p.G, p.K, *map(address, (*_matrices(p), d, x, y))
-    )
-    call("decimated", ctypes.byref(source), ctypes.byref(plan))
+    most = _blocks_together(p.L, table.tile)
+    length = -(-max(len(p.X0), len(p.A), p.L * most) // table.tile) * table.tile
+    U, rows = room.array("U", table.count * length), room.array("rows", 3, states.n, table.tile)
+    y, d, x = room.array("y", S, p.K), room.array("d", p.blocks, S, 2 * STATE), room.array("x", S, STATE)
+    numbers = table.count, S, table.tile, length
+    source = SourceStructure(table.address, address(constants), *numbers, *map(address, (entries.wanted, U, rows)))
+    sizes = p.blocks, most, len(p.X0), len(p.A), p.K - p.blocks * p.G, p.K
+    plan = DecimationStructure(samples.start, p.N, p.phase, p.L, p.G, *sizes, *map(address, (*_matrices(p), d, x, y)))
+    call("decimated", *map(ctypes.byref, (states.structure, source, plan)))
     return y
 
 
-def _every_sample(entries: Entries, states: tuple[Array, ...], samples: slice, constants: Array, room: Room) -> Array:
+def _blocks_together(L: int, tile: int) -> int:
+    """Blocks of L samples evaluated together: those that fill the tiles best, up to TOGETHER samples."""
+    return min(range(1, max(1, TOGETHER // L) + 1), key=lambda k: (-k * L % tile) / (k * L))
+
+
+def _every_sample(entries: Entries, states: FilteredStates, samples: slice, constants: Array, room: Room) -> Array:
     """The wanted signals at all samples, shape (S, N)."""
-    N = samples.stop - samples.start
-    U = room.array("U", entries.model.signals.count, N)
-    pointers = [ctypes.c_void_p(address(x) + 8 * samples.start) for x in states]
-    stride, ustride = ctypes.c_int64(states[0].shape[1]), ctypes.c_int64(N)
-    function = ctypes.CFUNCTYPE(ctypes.c_int32)(entries.model.signals.address)
-    status = function(ctypes.c_int64(N), *pointers, stride, ctypes.c_void_p(address(constants)), ctypes.c_void_p(address(U)), ustride)
-    if status:
-        raise InputError(f"{entries.model.NAME}: its signals in C refused {N} samples with {status}")
+    N, table = samples.stop - samples.start, entries.model.signals
+    U, rows = room.array("U", table.count, N), states.rows(samples)
+    pointers = [ctypes.c_void_p(address(x)) for x in (*rows, constants, U)]
+    size = ctypes.c_int64(N)
+    if ctypes.CFUNCTYPE(ctypes.c_int32)(table.address)(size, *pointers[:3], size, *pointers[3:], size):
+        raise InputError(f"{entries.model.NAME}: its signals in C refused {N} samples")
     return np.take(U, entries.wanted, axis=0, out=room.array("y", len(entries.wanted), N), mode="clip")

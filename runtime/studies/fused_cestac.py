@@ -115,7 +115,7 @@ class FusedWorkspace:
     def _signals(self, part: Part, q: Array, room: fused.Room) -> Array:
         """Distinct signals of the wanted columns at the kept samples, shape (S, K)."""
         chosen = part.selection
-        states = fused.states(q, part.rate, chosen.signals, room)
+        states = fused.FilteredStates(q, part.rate, chosen.signals, room)
         y = fused.decimated(self.entries, states, chosen.samples, chosen.factor, chosen.signals.decimate, self.constants, room)
         if not np.isfinite(y).all():
             raise InputError(f"the regressor of {self.model.NAME} is not finite at perturbed positions; use smaller steps")

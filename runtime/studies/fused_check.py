@@ -41,7 +41,7 @@ def _agree() -> bool:
     model = _model(cast(int, ctypes.cast(callback, ctypes.c_void_p).value))
     entries = fused.Entries(model, model.BASE_PARAMETERS)
     expected = filtered_states(q, RATE, SETTINGS)
-    states = fused.states(q, RATE, SETTINGS, room)
+    states = fused.FilteredStates(q, RATE, SETTINGS, room)
     y = fused.decimated(entries, states, slice(0, N), 3, SETTINGS.decimate, np.zeros(1), room)
     u = decimated(np.vstack([expected.q.T, np.ones(N)]), 3, SETTINGS.decimate)
     K = u.shape[1]
@@ -49,7 +49,7 @@ def _agree() -> bool:
     W = np.vstack([np.column_stack([u[0], u[2], np.zeros(K)]), np.column_stack([np.zeros(K), -u[2], u[1]])])
     X = np.linalg.lstsq(W, Y.ravel(), rcond=None)[0]
     rows = KeptRows(entries, [(y, Y, mask)], room)
-    pairs = [*zip(states, (expected.q.T, expected.qd.T, expected.qdd.T), strict=True), (y, u)]
+    pairs = [(states.rows(slice(0, N)), np.stack([expected.q.T, expected.qd.T, expected.qdd.T])), (y, u)]
     pairs += [(least_squares(rows, limit).X, X) for limit in (0.0, np.inf)]
     return all(np.abs(found - right).max() <= TOLERANCE * np.abs(right).max() for found, right in pairs)
 
@@ -69,5 +69,5 @@ def _signals(m: int, q: Any, qd: Any, qdd: Any, stride: int, constants: Any, U: 
 def _model(address: int) -> CompiledModel:
     """Gamma_1 = q1 X_1 + X_2, Gamma_2 = -X_2 + q2 X_3."""
     column, row, signal = np.array([0, 1, 1, 2]), np.array([0, 0, 1, 1]), np.array([0, 2, 2, 1])
-    table = Signals(address, 3, 1, column, row, signal, np.array([1, 1, -1, 1]), signal == 2)
+    table = Signals(address, 3, 16, column, row, signal, np.array([1, 1, -1, 1]), signal == 2)
     return cast(CompiledModel, SimpleNamespace(NAME="check", JOINTS=(1, 2), BASE_PARAMETERS=("X1", "X2", "X3"), signals=table))

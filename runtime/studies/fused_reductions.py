@@ -207,13 +207,11 @@ class StreamedRows(CRows):
 
     def _stream(self, task: int, entries: EntriesStructure, X: Array | None, t: int, m: int) -> None:
         table, n = self.entries.model.signals, self.entries.n
-        scratch, U = self.room.array("block", 4, n, PADDED), self.room.array("blockU", table.count, PADDED)
-        q, qd, qdd, Y = (x.ctypes.data for x in scratch)
-        source = SourceStructure(table.address, address(self.constants), q, qd, qdd, PADDED, table.count, 0, PADDED, None, address(U))
-        rows = RowsStructure(0, 0, 0, 0, None, Y, None)
-        given: Any = (ctypes.c_void_p * 4)(*(x.ctypes.data + 8 * n * t for x in self.given))
-        sizes = ctypes.c_int64(m), ctypes.c_int64(SPAN)
-        call("stream", ctypes.c_int32(task), *map(ctypes.byref, (source, entries, rows)), *sizes, given, _pointer(X))
+        U, rows = self.room.array("blockU", table.count, PADDED), self.room.array("block", 4, n, PADDED)
+        source = SourceStructure(table.address, address(self.constants), table.count, 0, table.tile, 0, None, address(U), address(rows))
+        given: Any = (ctypes.c_void_p * 4)(*(address(x) + 8 * n * t for x in self.given))
+        sizes = map(ctypes.c_int64, (m, SPAN, PADDED))
+        call("stream", ctypes.c_int32(task), *map(ctypes.byref, (source, entries)), *sizes, given, _pointer(X))
 
 
 def _pointer(X: Array | None) -> ctypes.c_void_p:

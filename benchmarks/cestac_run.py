@@ -1,0 +1,162 @@
+"""One run of a resolution study: the plain pipeline, the NumPy path and the fused C path, and C on two workers against one.
+
+    python benchmarks/cestac_run.py [--rounds 7] [--runs 600]
+
+A run perturbs every sample of the position (two-point, 2 pi/5000), filters, evaluates W, decimates by 40 and solves Y = W X. Plain: low-pass by
+scipy, the dense W of the emitted NumPy module, scipy.signal.decimate column by column, numpy.linalg.lstsq; Y is decimated once for all three. TX40,
+on its record in motion (37501 samples) with its essential and with all 60 columns, and on all 45000 samples with 60 columns.
+
+One process pinned to one core, one BLAS thread, CPU time, contenders in rotated order in every round, ratios per round as median [range]. X of the
+three is compared before timing. Workers: processes, wall time of a whole study without the start of the processes (a study of a few runs is
+subtracted), with the load of the machine. Goals: NumPy 10, C 60 times faster than plain; two workers 1.6 times faster than one.
+"""
+
+from __future__ import annotations
+
+import os
+
+for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"
+
+import argparse
+import platform
+import statistics
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import scipy
+from c_speed import interleave, processor, ratio
+
+from runtime import GeneratedModel, Record, Study, filtered_states, load_model, read_records, study_from_mapping
+from runtime.cestac import cestac, levels_of
+from runtime.cestac_run import Part, Task, one_run, perturbed_position
+from runtime.drives import Drives
+from runtime.essential import essential
+from runtime.io.datasets import dataset_study
+from runtime.observation import decimated_torque, observe, select_rows
+from runtime.studies import fused, fused_cestac
+from runtime.studies.compile_cache import FallbackWarning, compiler
+from runtime.studies.compiled import compiled_model
+from symgen.description import load_robot
+from symgen.emit import generate_files
+
+Array = np.ndarray
+ROBOT, KEY = "tx40", (0, 0)
+
+
+def task_of(model: GeneratedModel, record: Record, study: Study, names: tuple[str, ...]) -> Task:
+    """What every run of the study needs."""
+    signals = replace(study.signals, median=1)
+    selection = select_rows(record, filtered_states(record.q, record.rate, signals).qd, signals, study.rows)
+    part = Part(record.q, record.tau, record.rate, {}, selection, decimated_torque(record.tau, selection))
+    drives = Drives.from_mapping(model.DRIVES) if model.DRIVES else None
+    return Task((part,), model, names, replace(study.estimate, columns="all"), study.cestac, levels_of(study.cestac), drives, {})
+
+
+def plain_run(task: Task, key: tuple[int, int]) -> Array:
+    """The same estimate as anyone would write it."""
+    (part,), n = task.parts, len(task.model.JOINTS)
+    chosen = part.selection
+    q = perturbed_position(part.q, task.levels[key[0]], task.settings, task.drives, key)
+    states = filtered_states(q, part.rate, chosen.signals)[chosen.samples]
+    W = task.model.observation_matrix(states.q, states.qd, states.qdd)
+    numbers = [task.model.BASE_PARAMETERS.index(name) for name in task.names]
+    W_j = [W[j * len(states) : (j + 1) * len(states), numbers] for j in range(n)]
+    W_fd = [np.column_stack([scipy.signal.decimate(w, chosen.factor, zero_phase=True) for w in rows.T]) for rows in W_j]
+    mask = chosen.mask
+    return np.linalg.lstsq(np.vstack([w[m] for w, m in zip(W_fd, mask, strict=True)]), part.torque[mask], rcond=None)[0]
+
+
+def measure(title: str, module: GeneratedModel, record: Record, study: Study, names: tuple[str, ...], rounds: int) -> None:
+    task, in_c = task_of(module, record, study, names), task_of(compiled_model(module), record, study, names)
+    part = task.parts[0]
+    N, K = part.selection.samples.stop - part.selection.samples.start, len(part.selection.kept)
+    print(f"\n{title}: {len(record.q)} samples, {N} of them used, {K} kept, {len(names)} columns")
+    X = plain_run(task, KEY)
+    for label, found in (("NumPy", one_run(task, KEY).X), ("C", fused_cestac.run_block(in_c, [KEY]).X[0])):
+        print(
+            f"    {label:6} largest difference from plain {np.abs(np.array(found) - X).max() / np.abs(X).max():.1e} of the largest parameter"
+        )
+    contenders: dict[str, Callable[[], object]] = {
+        "plain": lambda: plain_run(task, KEY),
+        "NumPy": lambda: one_run(task, KEY),
+        "C": lambda: fused_cestac.run_block(in_c, [KEY]),
+        **stages(in_c),
+    }
+    times = interleave(contenders, rounds)
+    for name, row in times.items():
+        print(f"    {name:24} {1e3 * statistics.median(row):8.2f} ms")
+    for below, goal in (("NumPy", 10), ("C", 60)):
+        print(f"    plain / {below:16} {ratio(times, 'plain', below)}   goal {goal}")
+
+
+def stages(task: Task) -> dict[str, Callable[[], object]]:
+    """The stages of a run in C, each on the arrays of the one before."""
+    work = fused_cestac.FusedWorkspace(task)
+    (part, q, room), chosen = work.parts[0], task.parts[0].selection
+    states = fused.FilteredStates(q, part.rate, chosen.signals, room)
+    arguments = chosen.samples, chosen.factor, chosen.signals.decimate, work.constants, room
+    y = fused.decimated(work.entries, states, *arguments)
+    rows = fused_cestac.KeptRows(work.entries, [(y, part.torque, chosen.mask)], work.room)
+    return {
+        "  C: perturb": lambda: perturbed_position(q, task.levels[0], task.settings, task.drives, KEY),
+        "  C: filters": lambda: fused.FilteredStates(q, part.rate, chosen.signals, room),
+        "  C: signals, decimation": lambda: fused.decimated(work.entries, states, *arguments),
+        "  C: least squares": lambda: fused_cestac.least_squares(rows),
+    }
+
+
+def workers(model: GeneratedModel, record: Record, study: Study, runs: int, rounds: int) -> None:
+    """Wall time of `runs` runs on one and two processes, without their start."""
+
+    def wall(count: int, number: int) -> float:
+        settings = replace(study.cestac, delta=study.cestac.delta[:1], runs=number, columns="all")
+        start = time.perf_counter()
+        cestac(model, record, replace(study, cestac=settings), workers=count)
+        return time.perf_counter() - start
+
+    per_round, spent = [], {1: [], 2: []}
+    for k in range(rounds):
+        net = {count: wall(count, runs) - wall(count, 8) for count in ((1, 2) if k % 2 else (2, 1))}
+        per_round.append(net[1] / net[2])
+        for count, seconds in net.items():
+            spent[count].append(seconds)
+    shown = ", ".join(f"{count} worker{'s' * (count > 1)} {statistics.median(row):.2f} s" for count, row in spent.items())
+    print(f"\n{runs} runs in C, 60 columns, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} (this study included): {shown}")
+    print(f"    1 / 2 {statistics.median(per_round):6.2f}  [{min(per_round):.2f}, {max(per_round):.2f}]   goal 1.6")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--runs", type=int, default=600)
+    settings = parser.parse_args()
+    warnings.simplefilter("error", FallbackWarning)
+    load, cores = os.getloadavg(), os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(cores)})
+    versions = f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}"
+    print(f"{processor()}, {compiler()[1].partition(chr(10))[0]}, {versions}, load {load[0]:.1f}")
+    print(f"CPU time on one core, {settings.rounds} interleaved rounds, ratios as median [range]")
+    with TemporaryDirectory() as folder:
+        for file, text in generate_files(load_robot(ROBOT), targets=("numpy", "c"), command=ROBOT).items():
+            Path(folder, file).write_text(text, encoding="utf-8")
+        model = load_model(ROBOT, folder=Path(folder))
+        study = study_from_mapping(dataset_study(ROBOT))
+        study = replace(study, cestac=replace(study.cestac, delta=(2 * np.pi / 5000,), rounding="two-point", side="joint"))
+        record = read_records(study.record, model)[0]
+        names = essential(observe(model, record, study), study.essential, study.estimate).names
+        every, whole = tuple(model.BASE_PARAMETERS), replace(study, rows=replace(study.rows, window=(None, None)))
+        measure("TX40 in motion, essential columns", model, record, study, names, settings.rounds)
+        measure("TX40 in motion, all columns", model, record, study, every, settings.rounds)
+        measure("TX40, all samples, all columns", model, record, whole, every, settings.rounds)
+        os.sched_setaffinity(0, cores)
+        workers(compiled_model(model), record, study, settings.runs, max(3, settings.rounds // 2))
+
+
+if __name__ == "__main__":
+    main()
