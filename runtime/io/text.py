@@ -24,7 +24,7 @@ class TextTable:
     file: str
     names: tuple[str, ...]
     lines: tuple[str, ...]
-    line_numbers: tuple[int, ...]
+    line_numbers: Sequence[int]
     delimiter: str | None
 
     def stack(self, names: Sequence[str]) -> Array:
@@ -74,8 +74,8 @@ class TextBlocks:
         check_names(names, self.names, self.file)
         lines = self._lines()
         while block := list(islice(lines, size)):
-            _check_widths(block, self.names, self.delimiter, self.file)
-            yield TextTable(self.file, self.names, tuple(line for _, line in block), tuple(k for k, _ in block), self.delimiter)
+            numbers, found = zip(*block, strict=True)
+            yield _table(found, numbers, self.names, self.delimiter, self.file)
 
     def _lines(self) -> Iterator[tuple[int, str]]:
         return islice(_numbered_lines(self.path), 1 if self.has_header else 0, None)
@@ -108,16 +108,19 @@ def read_text(data: bytes, file: str) -> TextTable:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as e:
         raise InputError(f"not a text file in UTF-8 (byte {e.start})", file=file) from None
-    numbered = [(k, line.strip()) for k, line in enumerate(text.splitlines(), start=1)]
-    numbered = [(k, line) for k, line in numbered if line and not line.startswith("#")]
-    if not numbered:
+    lines: Sequence[str] = tuple(map(str.strip, text.splitlines()))
+    numbers: Sequence[int] = range(1, len(lines) + 1)
+    if "#" in text or not all(lines):
+        kept = [(k, line) for k, line in zip(numbers, lines, strict=True) if line and not line.startswith("#")]
+        numbers, lines = [k for k, _ in kept], [line for _, line in kept]
+    if not lines:
         raise InputError("no line of numbers", file=file)
-    names, has_header, delimiter = _header(numbered[0][1], file)
-    numbered = numbered[1:] if has_header else numbered
-    if not numbered:
+    names, has_header, delimiter = _header(lines[0], file)
+    if has_header:
+        numbers, lines = numbers[1:], lines[1:]
+    if not lines:
         raise InputError(f"no line of numbers under the header {', '.join(names)}", file=file)
-    _check_widths(numbered, names, delimiter, file)
-    return TextTable(file, names, tuple(line for _, line in numbered), tuple(k for k, _ in numbered), delimiter)
+    return _table(lines, numbers, names, delimiter, file)
 
 
 def _header(line: str, file: str) -> tuple[tuple[str, ...], bool, str | None]:
@@ -132,12 +135,13 @@ def _header(line: str, file: str) -> tuple[tuple[str, ...], bool, str | None]:
     return tuple(header), True, delimiter
 
 
-def _check_widths(numbered: Sequence[tuple[int, str]], names: Sequence[str], delimiter: str | None, file: str) -> None:
-    """Raise InputError at the first line that does not have one field per name."""
-    for k, line in numbered:
-        width = len(_fields(line, delimiter)) if delimiter is None or '"' in line else line.count(delimiter) + 1
-        if width != len(names):
-            raise InputError(f"{width} fields; expected {len(names)} ({', '.join(names)})", file=file, row=f"line {k}")
+def _table(lines: Sequence[str], numbers: Sequence[int], names: tuple[str, ...], delimiter: str | None, file: str) -> TextTable:
+    """The table, if every line has one field per name."""
+    widths = map(len, map(str.split, lines)) if delimiter is None else (line.count(delimiter) + 1 for line in lines)
+    wrong = next(((k, width) for k, width in zip(numbers, widths, strict=True) if width != len(names)), None)
+    if wrong:
+        raise InputError(f"{wrong[1]} fields; expected {len(names)} ({', '.join(names)})", file=file, row=f"line {wrong[0]}")
+    return TextTable(file, names, tuple(lines), numbers, delimiter)
 
 
 def _delimiter(line: str) -> str | None:
