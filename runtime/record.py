@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -66,6 +67,10 @@ class Record:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Records travel to other processes; a read-only mapping alone could not."""
+        return Record, (self.t, self.q, self.tau, self.rate, self.name, dict(self.files), self.q_r)
 
 
 def check_finite(x: Array, names: list[str], file: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
@@ -13,7 +13,10 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from runtime.errors import InputError, SettingsError
 from runtime.io.datasets import DATASETS, dataset_study
 from runtime.io.table import READERS
+from runtime.mapping import structure
 from runtime.study import RecordSettings, Study, study_from_mapping
+
+T = TypeVar("T")
 
 LONGEST = 1_000_000  # characters
 DEEPEST = 50  # levels; also stops an alias that contains itself
@@ -39,17 +42,26 @@ def study_of(record: str) -> tuple[Study, Path]:
 
 def load_study(path: Path) -> Study:
     """The Study of a study file; raises SettingsError with file, line and key."""
+    return study_from_text(text_of(path), file=path.name)
+
+
+def text_of(path: Path) -> str:
+    """The text of a file of settings."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as e:
         raise InputError(f"cannot be read: {e}", file=str(path)) from e
-    return study_from_text(text, file=path.name)
 
 
 def study_from_text(text: str, *, file: str = "study") -> Study:
     """The Study of the text of a study file."""
+    return settings_from_text(Study, text, file=file)
+
+
+def settings_from_text(kind: type[T], text: str, *, file: str) -> T:
+    """The settings, a frozen dataclass, of a YAML text; raises SettingsError with file, line and key."""
     if len(text) > LONGEST:
-        raise InputError(f"{len(text)} characters; a study file has at most {LONGEST}", file=file)
+        raise InputError(f"{len(text)} characters; such a file has at most {LONGEST}", file=file)
     try:
         tree = YAML(typ="rt", pure=True).load(text)
     except MarkedYAMLError as e:
@@ -59,7 +71,7 @@ def study_from_text(text: str, *, file: str = "study") -> Study:
         raise SettingsError(f"not YAML: {str(e).splitlines()[0] if str(e) else type(e).__name__}", file=file) from None
     values = _plain(tree, file, [0], 0)
     try:
-        return study_from_mapping({} if values is None else values)
+        return structure(kind, {} if values is None else values)
     except SettingsError as e:
         raise SettingsError(e.reason, path=e.path, file=file, line=_line(tree, e.path)) from None
 

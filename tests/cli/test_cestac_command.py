@@ -2,11 +2,15 @@
 
 import json
 
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
 
+from runtime.checkpoint import Checkpoint
 from symgen.cli.cestac import cestac
+
+FILES = {"report.html", "cestac.json", "study.yaml", "resolution.png", "resolution.svg"}
 
 
 def run(*arguments):
@@ -19,7 +23,7 @@ def test_fine_encoder_is_unbiased(emps_data, tmp_path):
     result = run("emps", "emps", "--delta", "1e-6", "--runs", 3, "-o", tmp_path)
     assert result.exit_code == 0, result.output
     assert "practically unbiased at 1e-06" in result.stdout
-    assert {p.name for p in tmp_path.iterdir()} == {"report.html", "cestac.json", "study.yaml", "resolution.png", "resolution.svg"}
+    assert {p.name for p in tmp_path.iterdir()} == FILES
 
 
 def test_coarse_encoder_is_biased(emps_data):
@@ -73,3 +77,41 @@ def test_advice_judges_the_steps_asked_for(emps_data):
     assert json.loads(coarse.stdout)["asked"][0]["worst"][0] == "M1R"
     refused = run("emps", "emps", "--advise", "--runs", 4, "--delta", "x")
     assert refused.exit_code == 2
+
+
+def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(emps_data, tmp_path, monkeypatch):
+    arguments = ["emps", "emps", "--delta", "1e-6", "--runs", 12, "-o", tmp_path]
+    taken = []
+
+    def interrupted(checkpoint, runs):
+        taken.append(len(runs))
+        checkpoint._new.append(runs)
+        if sum(taken) >= 6:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpoint, "add", interrupted)
+        stopped = run(*arguments)
+    assert stopped.exit_code == 130
+    assert f"stopped; 6 runs are in {tmp_path / 'runs'}: the same command goes on" in stopped.stderr
+    assert {p.name for p in tmp_path.iterdir()} == {"runs"}
+    other = run(*arguments[:-2], "--seed", 2, "-o", tmp_path)
+    assert other.exit_code == 2 and "another study, cestac.seed differ" in other.stderr
+    whole = run(*arguments)
+    assert whole.exit_code == 0 and {p.name for p in tmp_path.iterdir()} == FILES
+    assert json.loads((tmp_path / "cestac.json").read_text())["levels"] == json.loads(run(*arguments[:-2], "--json").stdout)["levels"]
+
+
+def test_many_runs_stay_in_their_archives(tmp_path, emps_data):
+    """2 steps of 501 runs: more than cestac.json lists."""
+    result = run("emps", "emps", "--delta", "1e-6", "--delta", "1e-7", "--runs", 501, "--columns", "M1R", "-o", tmp_path)
+    assert result.exit_code == 0
+    assert {p.name for p in tmp_path.iterdir()} == FILES | {"runs"}
+    assert json.loads((tmp_path / "cestac.json").read_text())["levels"][1]["runs"] is None
+    with np.load(tmp_path / "runs" / "000000.npz") as archive:
+        assert archive["X"].shape == (1002, 1)
+
+
+def test_scheduler_that_does_not_answer(emps_data):
+    result = run("emps", "emps", "--scheduler", "tcp://nowhere")
+    assert result.exit_code == 2 and "no answer from the scheduler tcp://nowhere" in result.stderr
