@@ -21,6 +21,8 @@ from tempfile import TemporaryDirectory
 
 FLAGS = ("-std=c11", "-O2", "-ftree-vectorize", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-shared", "-fPIC")
 LIBRARIES = ("-lm",)
+WIDTHS = ("avx512f", "avx2")  # of vectors on x86-64, widest first
+VECTOR_SINES = "-fveclib=libmvec"
 UNSAFE = ("-ffast-math", "-Ofast", "-funsafe-math-optimizations")  # set flush-to-zero in the process that loads the object
 TIME = 120.0  # s, of one compilation
 
@@ -52,6 +54,7 @@ def shared_object(
     text : what the file holds.   opened : loads and checks an object; raises NotCompiledError or OSError where it is not the one wanted.
     """
     command, version = compiler()
+    flags = (*flags, *_width())
     parts = (text, " ".join((*flags, *LIBRARIES)).encode(), " ".join(command).encode(), version.encode(), _processor().encode())
     key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -71,8 +74,8 @@ def _compiled(command: Sequence[str], flags: Sequence[str], path: Path, text: by
     with TemporaryDirectory(dir=folder, prefix=".compiling-") as scratch:
         source, target = Path(scratch) / path.name, Path(scratch) / f"{path.stem}.so"
         source.write_bytes(text)
-        line = [*command, *flags, source.name, "-o", target.name, *LIBRARIES]
         try:
+            line = [*command, *flags, *_vector_sines(command), source.name, "-o", target.name, *LIBRARIES]
             done = subprocess.run(line, cwd=scratch, capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
         except (OSError, subprocess.TimeoutExpired) as e:
             raise NotCompiledError(f"{' '.join(command)} did not run: {e}") from e
@@ -82,6 +85,24 @@ def _compiled(command: Sequence[str], flags: Sequence[str], path: Path, text: by
         final = folder / f"{key}-{hashlib.sha256(target.read_bytes()).hexdigest()[:32]}.so"
         target.replace(final)
     return final
+
+
+def _width() -> tuple[str, ...]:
+    """Macro WIDTH: the widest vectors of this processor, as the C files ask for one width instead of several."""
+    if platform.machine().lower() not in ("x86_64", "amd64"):
+        return ()
+    known = _cpuinfo("flags").split()
+    return (f'-DWIDTH="{next((width for width in WIDTHS if width in known), "sse2")}"',)
+
+
+def _vector_sines(command: Sequence[str]) -> tuple[str, ...]:
+    """The option by which clang uses the vector functions of glibc, where it knows it; gcc has a declaration in the C file."""
+    if platform.libc_ver()[0] != "glibc" or platform.machine() != "x86_64":
+        return ()
+    predefined = subprocess.run(
+        [*command, VECTOR_SINES, "-dM", "-E", "-x", "c", os.devnull], capture_output=True, timeout=TIME, check=False
+    )
+    return (VECTOR_SINES,) if predefined.returncode == 0 and b"__clang__" in predefined.stdout else ()
 
 
 def compiler() -> tuple[tuple[str, ...], str]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from symgen.derive.graph import Scalar
 from symgen.derive.loops import close
 from symgen.description.robot import Robot
+from symgen.emit.c_parts import Part, definitions, parts, words_of
 from symgen.emit.c_printer import CText, identifier
 from symgen.emit.header import header, packed, wrapped
 from symgen.emit.printers import Section
@@ -48,6 +49,8 @@ class Kernel:
     trigonometry: tuple[Section, ...]  # apart: compilers merge sin(x) and cos(x) of one loop into a call that has no vector form
     calls: int
     sections: tuple[Section, ...]
+    parts: tuple[Part, ...]  # of the sections, where those are long
+    crossing: int  # rows of V, which the parts hand over
     rows: tuple[str, ...]
     entries: int
     count: int
@@ -89,7 +92,7 @@ def c_spec(spec: ModuleSpec) -> CSpec:
     kernels.append(_kernel(regrouping, "inertia_matrix", matrix, headings))
     kernels.append(_torques(regrouping, "bias", *torque_graph(regrouping, acceleration=False)))
     kernels.append(_torques(regrouping, "gravity", *torque_graph(regrouping, acceleration=False, velocity=False)))
-    most = max(kernel.computed for kernel in kernels)
+    most = max(kernel.computed + kernel.crossing for kernel in kernels)
     tile = next((B for B in (64, 32, 16) if 8 * B * most <= SCRATCH), 8)
     return CSpec(robot, tuple(_header(spec)), tuple(kernels), tile, n)
 
@@ -119,7 +122,11 @@ def _kernel(regrouping: Regrouping, name: str, outputs: Outputs, headings: Headi
     inputs = [_input(name, *place[name]) for name in place if name in text.main_inputs]
     recalled = [f"const double {called} = T[{k}][t];" for k, (called, _) in enumerate(trigonometry)]
     results = (Section(title, tuple(lines)) for title, lines in under.items())
-    sections = [Section("Inputs", (*inputs, *recalled)), *text.sections, *results]
+    trigonometry_loops = tuple(Section(title, (*angles, *text.angles, *lines)) for title, lines in waves if lines)
+    body = [*text.sections, *results]
+    before = [*before, *parameters, *text.fixed]
+    divided, crossing = parts(before, [*inputs, *recalled], body)
+    sections = [Section("Inputs", (*inputs, *recalled)), *body]
     read = text.trigonometry_inputs | text.main_inputs
     return Kernel(
         name=name,
@@ -130,10 +137,12 @@ def _kernel(regrouping: Regrouping, name: str, outputs: Outputs, headings: Headi
         used=tuple(s for s in states if any(place[x][0] == s for x in read if x in place)),
         needs_X=bool(parameters),
         needs_constants=needs_constants,
-        before=(*before, *parameters, *text.fixed),
-        trigonometry=tuple(Section(title, (*angles, *text.angles, *lines)) for title, lines in waves if lines),
+        before=definitions(before, words_of(line for s in trigonometry_loops for line in s.lines)) if divided else tuple(before),
+        trigonometry=trigonometry_loops,
         calls=len(trigonometry),
         sections=tuple(s for s in sections if s.lines),
+        parts=tuple(divided),
+        crossing=crossing,
         rows=tuple(packed([f"{{{row}, {signal}, {sign}}}" for row, signal, sign in signals.rows])),
         entries=len(signals.rows),
         count=len(signals.rows) - signals.constant * (name == "regressor"),  # its store holds constants from the start
@@ -201,12 +210,31 @@ def layout(spec: CSpec) -> list[dict[str, object]]:
             {
                 **vars(k),
                 "tile_prototype": signature(f"KERNEL static void {k.name}_tile", tile),
+                "part_functions": _part_functions(k, n),
                 "tile_arguments": ", ".join(arguments),
                 "prototype": signature(f"int32_t {spec.robot.name}_{k.name}", own),
                 "scratch": ", ".join([*(f"{s}_tile[{n}][TILE]" for s in k.used), f"{k.result}[{k.computed}][TILE]"]),
                 "missing": " || ".join(f"{p} == NULL" for p in [*pointers, "S"]),
             }
         )
+    return found
+
+
+def _part_functions(k: Kernel, n: int) -> list[dict[str, object]]:
+    parameters = {
+        **{s: f"double {s}[restrict {n}][TILE]" for s in k.used},
+        "X": "const double *restrict X",
+        "constants": "const double *restrict constants",
+        "T": f"double T[restrict {k.calls}][TILE]",
+        "V": f"double V[restrict {k.crossing}][TILE]",
+        k.result: f"double {k.result}[restrict {k.computed}][TILE]",
+    }
+    found: list[dict[str, object]] = []
+    for number, part in enumerate(k.parts, 1):
+        own = {name: text for name, text in parameters.items() if name in part.words}
+        name = f"{k.name}_part{number}"
+        prototype = signature(f"PART static void {name}", list(own.values()))
+        found.append({"prototype": prototype, "call": f"{name}({', '.join(own)})", "before": part.before, "sections": part.sections})
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -17,7 +18,7 @@ import pytest
 
 from symgen.cli.generate import emitted
 from symgen.description import load_robot, packaged_robots, parse_robot
-from symgen.emit import generate_files
+from symgen.emit import c_parts, generate_files
 from symgen.emit.c_target import has_c_target
 
 FLAGS = ["-std=c11", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
@@ -96,6 +97,19 @@ def test_agrees_with_numpy(name: str, tmp_path: Path) -> None:
 def test_portable_path(name: str, compiler: str, tmp_path: Path) -> None:
     library = ctypes.CDLL(str(compiled(tmp_path, files(name)[f"{name}.c"], compiler, [*FAST, "-DPORTABLE"])))
     compare(library, numpy_module(name, files(name)[f"{name}.py"]), (1, 131))
+
+
+@needs_compiler
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_long_bodies_in_parts(compiler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every kernel cut into functions of a few lines says the same, without warnings, in one width."""
+    monkeypatch.setattr(c_parts, "LONG", 30)
+    monkeypatch.setattr(c_parts, "PART", 25)
+    text = generate_files(load_robot("two_branch"), targets=("c",), command="two_branch")["two_branch.c"]
+    assert all(f"PART static void {name}_part2(" in text for name in FUNCTIONS)
+    width = ['-DWIDTH="sse2"'] if platform.machine() == "x86_64" else []
+    library = ctypes.CDLL(str(compiled(tmp_path, text, compiler, [*FAST, *width])))
+    compare(library, numpy_module("two_branch", files("two_branch")["two_branch.py"]), (1, 131))
 
 
 def test_general_loops_have_none() -> None:
