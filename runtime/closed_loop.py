@@ -1,0 +1,185 @@
+"""The closed loop in which a record was made, run again with other parameters: what IV, DIDIM and CLOE compare the record with.
+
+    loop = closed_loop(model, records, study, simulator)
+    runs = loop.run(X, g)                 one simulation per record, exact states, no noise, no steps
+    Z    = loop.instruments(runs)         F_p[W(q_s, ...)], q_s through the filters of the record                   IDIM-IV
+    Z    = loop.motion(runs)              F_p[W(q_s, qd_s, qdd_s)], exact states through the decimation alone       DIDIM
+
+g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies all that stands between position error and torque: the bandwidth
+of the simulated loop stays that of the real one while X^k is far from the truth. Rows are chosen by the velocity of the reference, never by that
+of the measured positions: a choice that depends on noise biases every method. Instants with the torque at its limit are left out.
+
+Where the reference is not known (`reference: measured`), the measured motion through the filters stands for it: then the instruments carry the
+noise of the same run, and DIDIM is output error about itself. The Estimate says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from runtime.controller_settings import Controller
+from runtime.errors import InputError, SettingsError
+from runtime.model import GeneratedModel
+from runtime.observation import Observation, decimated_torque, observation_from_states, stack
+from runtime.record import Record
+from runtime.reference import Reference, reference_of
+from runtime.rows import Selection, select_rows
+from runtime.signals import States, filtered_states
+from runtime.study import Study
+
+Array = np.ndarray
+
+CLIPPED = 0.98  # of the largest torque: instants above it are left out
+ASSUMED = (
+    "The reference of this record is not known; the measured motion through the filters stands for it. Instruments then carry the noise of the same run, "
+    "and a simulated motion is compared with itself: bias is removed only as far as the noise does not pass the loop."
+)
+
+
+class Run(Protocol):
+    """What is used of a simulation: arrays of shape (N, n) at the recorded ticks."""
+
+    q: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+
+
+class Simulator(Protocol):
+    """What is used of `runtime.studies.simulation.Simulator`."""
+
+    controller: Controller
+    law: Any
+
+    def run(self, X: Array, reference: Reference, *, g: Array | float, start: Array, ideal: bool) -> Run:
+        """One run; raises InputError where it cannot be made."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopPart:
+    """One record: what the controller followed, at its rate, the rows used, and Y before rows are left out, shape (n, K)."""
+
+    record: Record
+    reference: Reference
+    selection: Selection
+    torque: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """The records with their loop. `assumption`: what was assumed about the reference; empty where it is known."""
+
+    model: GeneratedModel
+    study: Study
+    simulator: Simulator
+    parts: tuple[LoopPart, ...]
+    assumption: str = ""
+
+    def run(self, X: Array, g: Array | float = 1.0) -> list[Run]:
+        """One simulation per record with all base parameters X (b,), from the measured position at its start, at rest."""
+        return [self.simulator.run(X, part.reference, g=g, start=part.record.q[0], ideal=True) for part in self.parts]
+
+    def measured(self) -> Observation:
+        """Y = W X + rho of the measured positions on the rows of the loop."""
+        return self._observed([filtered_states(p.record.q, p.record.rate, p.selection.signals) for p in self.parts])
+
+    def instruments(self, runs: Sequence[Run]) -> Observation:
+        """Z of the simulated positions through the filters of the record, beside Y."""
+        return self._observed(
+            [filtered_states(run.q[: len(p.record)], p.record.rate, p.selection.signals) for run, p in zip(runs, self.parts, strict=True)]
+        )
+
+    def motion(self, runs: Sequence[Run]) -> Observation:
+        """Z of the exact simulated states, beside Y."""
+        sizes = [len(part.record) for part in self.parts]
+        return self._observed([States(run.q[:N], run.qd[:N], run.qdd[:N]) for run, N in zip(runs, sizes, strict=True)])
+
+    def inertia(self, X: Array) -> Array:
+        """J_j, shape (n,): mean of A_jj over the references."""
+        functions: Any = self.model
+        q = np.concatenate([part.reference.q[:: max(1, len(part.reference) // 500)] for part in self.parts])
+        return np.asarray(np.einsum("tjj->j", functions.inertia_matrix(q, X)) / len(q))
+
+    def _observed(self, states: Sequence[States]) -> Observation:
+        seen = [
+            observation_from_states(self.model, s, part.torque, part.selection, files=part.record.files)
+            for s, part in zip(states, self.parts, strict=True)
+        ]
+        return seen[0] if len(seen) == 1 else stack(seen)
+
+
+def closed_loop(
+    model: GeneratedModel,
+    records: Sequence[Record],
+    study: Study,
+    simulator: Simulator,
+    *,
+    reference: str = "known",
+    keep: Sequence[Array] = (),
+) -> ClosedLoop:
+    """The loop of a study with a section `controller`.
+
+    reference : "known" (that of the settings, or the columns qr1 ... of each record), or "measured".
+    keep : bool, shape (N,) or (N, n) per record: samples that may be used.
+    """
+    if reference not in ("known", "measured"):
+        raise SettingsError(f"{reference!r}; expected known or measured", path=("estimate", "options", "reference"))
+    controller = simulator.controller
+    parts = []
+    for k, record in enumerate(records):
+        rate = controller.rate / controller.record_every
+        if abs(record.rate / rate - 1) > 1e-3:
+            raise SettingsError(f"{record.name} at {record.rate:g} Hz, recorded every {controller.record_every} ticks of {controller.rate:g} Hz; expected the same",
+                                path=("controller", "rate"))  # fmt: skip
+        followed = _reference(model, records, k, controller, study, reference)
+        every = controller.record_every
+        if len(followed) // every + (len(followed) % every > 0) < len(record):
+            raise InputError(
+                f"the reference ends after {len(followed) / controller.rate:g} s, the record after {record.t[-1] - record.t[0]:g} s",
+                file=record.name,
+            )
+        wanted = followed.qd[::every][: len(record)]
+        selection = select_rows(
+            record, wanted, study.signals, study.rows, keep=_usable(simulator, record, keep[k] if k < len(keep) else None)
+        )
+        parts.append(LoopPart(record, followed, selection, decimated_torque(record.tau, selection)))
+    return ClosedLoop(model, study, simulator, tuple(parts), ASSUMED if reference == "measured" else "")
+
+
+def _reference(model: GeneratedModel, records: Sequence[Record], k: int, controller: Controller, study: Study, reference: str) -> Reference:
+    """What the controller followed in record k, at its rate."""
+    record = records[k]
+    if reference == "measured":
+        states = filtered_states(record.q, record.rate, study.signals)
+        if controller.record_every == 1:
+            return Reference(controller.rate, states.q, states.qd, states.qdd)
+        ticks = np.arange((len(record) - 1) * controller.record_every + 1) / controller.record_every
+        each = [np.column_stack([np.interp(ticks, np.arange(len(x)), column) for column in x.T]) for x in (states.q, states.qd, states.qdd)]
+        return Reference(controller.rate, *each)
+    if record.q_r is not None and controller.record_every == 1:
+        return Reference.sampled(record.q_r, controller.rate)
+    given = controller.reference
+    if all(getattr(given, name) is None for name in ("file", "motion", "points", "record")):
+        raise SettingsError(
+            f"what the controller followed in {record.name} is not known; give columns qr1 ... (record.columns.qr) or controller.reference, or say "
+            "estimate.options.reference: measured",
+            path=("controller", "reference"),
+        )
+    if len(records) > 1 and given.record is None:
+        raise SettingsError(
+            f"one reference for {len(records)} records; give each record its columns qr1 ...", path=("controller", "reference")
+        )
+    return reference_of(replace(controller, reference=replace(given, limits="ignore")), model, records=records)
+
+
+def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:
+    """`keep`, and the samples whose torque is not at its limit."""
+    bound = np.broadcast_to(np.asarray(simulator.law.saturation, dtype=float), (record.n,))
+    if not np.isfinite(bound).any():
+        return keep
+    free: Array = np.abs(record.tau) <= CLIPPED * bound
+    return free if keep is None else free & (keep if keep.ndim == 2 else keep[:, None])

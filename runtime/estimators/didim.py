@@ -1,0 +1,53 @@
+"""DIDIM: direct and inverse dynamic identification models; measured torques on the regressor of the simulated motion.
+
+    X^(k+1) = argmin sum_j ||Y_j - Z_j^k X||^2 / s_j^2,     Z^k = F_p[W(q_s, qd_s, qdd_s)] of the simulation with X^k
+
+Needs the measured torque and the reference; of the measured position only its start. Z passes the decimation alone: simulated states are
+exact. It is output error on the torque with the Jacobian of the loop left out (the loop holds q_s near q_r). C = (Z'VZ)^-1. The residual is that
+of the simulated motion, larger than that of IV with the same X: what moved the arm besides the model is not in Z.
+
+Reference: Gautier, Janot and Vandanjon (2013).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from runtime.closed_loop import ClosedLoop, Run
+from runtime.estimate import Estimate
+from runtime.estimators import wls
+from runtime.estimators.iteration import Array, Step, columns_of, iterate, options_of, told, trail_of
+from runtime.estimators.linear import System, assemble, standard_deviations
+from runtime.study import EstimateSettings
+
+
+def didim(
+    loop: ClosedLoop, settings: EstimateSettings, *, model: Any | None = None, provenance: Mapping[str, Any] | None = None
+) -> Estimate:
+    """The Estimate; `details`: trail of the passes, contraction."""
+    options = options_of(settings)
+    observation = loop.measured()
+    names = columns_of(observation, settings)
+
+    def update(runs: Sequence[Run], X: Array) -> Step:
+        system = _system(loop, runs, names)
+        fit = system.solve()
+        _, C = standard_deviations(system, fit)
+        return Step(fit.X, C, fit.residual_norm, system)
+
+    fixed = iterate(loop, observation, names, options, update)
+    status, message = told(loop, fixed, options, "DIDIM")
+    system: System = fixed.step.kept
+    found = assemble(replace(system, settings=settings, iterations=len(fixed.trail)), system.solve(), model=model, provenance=provenance)
+    return replace(
+        found,
+        status=status if found.status == "ok" else found.status,
+        message=" ".join(part for part in (found.message, message) if part),
+        details={"trail": trail_of(fixed), "contraction": fixed.contraction},
+    )
+
+
+def _system(loop: ClosedLoop, runs: Sequence[Run], names: Sequence[str]) -> System:
+    return wls.system(loop.motion(runs).columns(names), EstimateSettings(method="wls"))

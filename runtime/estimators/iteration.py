@@ -1,0 +1,204 @@
+"""What IV and DIDIM share: parameters and simulation in turn, gains that follow the inertia, steps that stay physical.
+
+    X^(k+1) = estimate from the record and the simulation with X^k and gains g(X^k), until it stands still; then again with g = 1
+
+g refers to X_ref, which is not the truth: the last passes need g = 1. A parameter vector whose loop cannot be simulated (inertia not positive
+definite, unstable) is refused: the step towards it is halved, at most five times. Stop: max |dX_i|/sigma_i < 0.1 and the norm of the residual
+changes by less than 1e-3 of itself, or the change is rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from runtime.closed_loop import ClosedLoop, Run
+from runtime.errors import InputError, SettingsError
+from runtime.estimators import ols
+from runtime.mapping import structure
+from runtime.observation import Observation
+from runtime.study import EstimateSettings
+
+Array = np.ndarray
+
+HALVINGS = 5
+SLOW = 0.9  # contraction above which the fixed point is hardly one
+
+
+@dataclass(frozen=True)
+class Options:
+    """estimate.options of iv and didim.
+
+    start : X^0: "ols", "values" of the robot file, or "unit" (motor inertia, else inertia or mass of the own link, 1 for every joint; rest 0).
+    gains : X_ref of g: "ols", "values", or "one" (no rescaling).   passes : largest number with rescaled gains, and with g = 1.
+    change, residual : the stop.   reference : "known", or "measured" where the reference has to be inferred (`runtime.closed_loop`).
+    """
+
+    start: Literal["ols", "values", "unit"] = "ols"
+    gains: Literal["ols", "values", "one"] = "ols"
+    passes: int = 15
+    change: float = 0.1
+    residual: float = 1e-3
+    reference: Literal["known", "measured"] = "known"
+
+    def __post_init__(self) -> None:
+        for name in ("passes", "change", "residual"):
+            if not getattr(self, name) > 0:
+                raise SettingsError(f"{getattr(self, name)!r}; expected a positive number", path=(name,))
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One estimate of a pass: X of the columns (c,), their covariance, norm of its residual, and what else the method keeps."""
+
+    X: Array
+    covariance: Array
+    norm: float
+    kept: Any = None
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed:
+    """Where the iteration ended: the last step, the trail, whether it stood still, ratio of its last two changes."""
+
+    step: Step
+    trail: tuple[dict[str, Any], ...]
+    converged: bool
+    contraction: float
+    message: str = ""
+
+
+def options_of(settings: EstimateSettings) -> Options:
+    """The options of a study, checked."""
+    return structure(Options, settings.options, ("estimate", "options"))
+
+
+def columns_of(observation: Observation, settings: EstimateSettings) -> tuple[str, ...]:
+    """Names of the columns that are estimated; the other parameters are zero."""
+    if settings.columns == "all":
+        return observation.names
+    unknown = [name for name in settings.columns if name not in observation.names]
+    if unknown:
+        raise SettingsError(
+            f"no parameter {', '.join(unknown)}; the model has {', '.join(observation.names)}", path=("estimate", "columns")
+        )
+    return tuple(settings.columns)
+
+
+def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
+    """All base parameters (b,) from those of the columns `names`; the others are zero."""
+    by_name = dict(zip(names, X, strict=True))
+    return np.array([by_name.get(name, 0.0) for name in every])
+
+
+def initial(loop: ClosedLoop, observation: Observation, names: Sequence[str], which: str) -> Array:
+    """X of the columns by ordinary least squares, from the robot file, or of unit inertia."""
+    if which == "ols":
+        return ols.system(observation.columns(names), EstimateSettings()).solve().X
+    model: Any = loop.model
+    standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)
+    if which == "values":
+        values = dict(model.VALUES)
+        if missing := [name for name in standard if name not in values]:
+            raise SettingsError(
+                f"{model.NAME} has no value of {', '.join(missing[:6])}; use start and gains: ols", path=("estimate", "options")
+            )
+        standard.update({name: values[name] for name in standard})
+    else:
+        for j in model.JOINTS:
+            own = next((name for name in (f"Ia{j}", f"ZZ{j}", f"M{j}") if name in standard), None)
+            if own is None:
+                raise SettingsError(
+                    f"joint {j} of {model.NAME} has no inertia of its own; use start: ols", path=("estimate", "options", "start")
+                )
+            standard[own] = 1.0
+    X = dict(zip(model.BASE_PARAMETERS, model.base_parameters(standard), strict=True))
+    return np.array([X[name] for name in names])
+
+
+def iterate(
+    loop: ClosedLoop, observation: Observation, names: Sequence[str], options: Options, update: Callable[[Sequence[Run], Array], Step]
+) -> Fixed:
+    """The fixed point of X -> update(simulation with X, X)."""
+    every = observation.names
+    X = initial(loop, observation, names, options.start)
+    J = None if options.gains == "one" else loop.inertia(full(names, initial(loop, observation, names, options.gains), every))
+    trail: list[dict[str, Any]] = []
+    step: Step | None = None
+    changes: list[float] = []
+    converged, message = False, ""
+    for rescaled in (True, False) if J is not None else (False,):
+        previous: Step | None = None
+        converged = False
+        for _ in range(options.passes):
+            X, g, runs, message = _simulated(loop, names, every, X, trail[-1]["X"] if trail else None, J if rescaled else None)
+            if step is not None and message:
+                return Fixed(step, tuple(trail), False, _contraction(changes), message)
+            step = update(runs, X)
+            sigma = np.sqrt(np.maximum(np.diag(step.covariance), 0.0))
+            size = np.where(sigma > 0, sigma, np.inf)
+            moved = np.abs(step.X - X)
+            change = float(np.max(moved / size, initial=0.0))
+            changes.append(float(np.linalg.norm(moved / np.maximum(np.abs(step.X), 1e-12))))
+            trail.append({"X": X, "next": step.X, "norm": step.norm, "g": g, "change": change})
+            still = previous is not None and abs(step.norm - previous.norm) <= options.residual * previous.norm
+            rounding = bool(np.all(moved <= 1e-9 * np.max(np.abs(step.X))))
+            X, previous = step.X, step
+            if (change < options.change and still) or rounding:
+                converged = True
+                break
+        if not converged:
+            break
+    assert step is not None  # options.passes >= 1
+    return Fixed(step, tuple(trail), converged, _contraction(changes))
+
+
+def _simulated(
+    loop: ClosedLoop, names: Sequence[str], every: Sequence[str], X: Array, before: Array | None, J: Array | None
+) -> tuple[Array, Array, Sequence[Run], str]:
+    """X that can be simulated, on the way from the last one that could; g, the runs, and why none could be made."""
+    reason = ""
+    for _ in range(HALVINGS + 1):
+        g = np.ones(len(loop.model.JOINTS))
+        try:
+            if J is not None:
+                g = loop.inertia(full(names, X, every)) / J
+                if not np.all(g > 0):
+                    raise InputError(f"inertia of negative sign about joint {int(np.argmin(g)) + 1}")
+            return X, g, loop.run(full(names, X, every), g), ""
+        except InputError as e:
+            reason = str(e)
+            if before is None:
+                raise
+            X = (X + before) / 2
+    return X, g, (), f"The simulation cannot be made, also after {HALVINGS} halved steps: {reason}"
+
+
+def _contraction(changes: Sequence[float]) -> float:
+    """Ratio of the last two changes; nan before there are two."""
+    return changes[-1] / changes[-2] if len(changes) > 1 and changes[-2] > 0 else float("nan")
+
+
+def told(loop: ClosedLoop, fixed: Fixed, options: Options, method: str) -> tuple[str, str]:
+    """Status and message of an Estimate."""
+    parts = [part for part in (fixed.message, loop.assumption) if part]
+    if not fixed.converged:
+        parts.insert(0, f"{method} has not converged after {len(fixed.trail)} passes.")
+        if not fixed.message:
+            parts.append(
+                "Likely causes: a wrong controller, delay or reference; parameters the record hardly determines. Raise passes, or start from values."
+            )
+    elif fixed.contraction > SLOW:
+        parts.append(f"The passes hardly contract (ratio {fixed.contraction:.2f}): the answer depends on where it stopped.")
+    return ("ok" if fixed.converged else "not-converged"), " ".join(parts)
+
+
+def trail_of(fixed: Fixed) -> list[Mapping[str, Any]]:
+    """The trail for `details`: parameters after each pass, norm of the residual, gains, change in sigmas."""
+    return [
+        {"X": entry["next"].tolist(), "norm": float(entry["norm"]), "g": np.asarray(entry["g"]).tolist(), "change": entry["change"]}
+        for entry in fixed.trail
+    ]

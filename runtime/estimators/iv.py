@@ -1,0 +1,156 @@
+"""IDIM-IV: instrumental variables from the simulated closed loop.
+
+    X^(k+1) = (Z'VW)^-1 Z'VY,   Z^k = F_p[W(q_s, qd_s, qdd_s)] with the filters of the record on q_s,   V = diag(1/s_j^2), s_j of Y - W X^k
+    C = A Z'VZ A', A = (Z'VW)^-1
+
+W is that of the measured positions, whose noise makes least squares biased; Z is free of it, so Z'V rho has mean zero. Bias that W and Z share,
+such as what the filters do to sign(qd), stays. The system is solved with the columns of W and Z scaled alike.
+
+`details` : trail; smallest correlation between the spaces of Z and W (1: the instruments explain W); condition of Z'VW with unit columns; the
+Hausman test on d = X_IV - X_WLS, whose covariance C_d is taken from blocks of residuals as for sigma_corrected: largest |d_i|/sigma_di with its name,
+and, where there are blocks enough, d'C_d^-1 d, about chi2(b) where least squares is unbiased.
+
+References: Janot, Vandanjon and Gautier (2014); Hausman (1978).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError
+from scipy.sparse import csr_array
+from scipy.stats import chi2
+
+from runtime.closed_loop import ClosedLoop, Run
+from runtime.errors import InputError
+from runtime.estimate import Estimate
+from runtime.estimators import ols, wls
+from runtime.estimators.correlated import block_of_rows, default_block
+from runtime.estimators.iteration import Array, Step, columns_of, iterate, options_of, told, trail_of
+from runtime.estimators.linear import assemble, outcome
+from runtime.observation import Observation
+from runtime.study import EstimateSettings
+
+CONDITION = 1e4
+"""Condition of Z'VW with unit columns above which the instruments are called weak."""
+CORRELATION = 0.1
+"""Smallest correlation of the spaces of Z and W below which they are."""
+
+
+def iv(loop: ClosedLoop, settings: EstimateSettings, *, model: Any | None = None, provenance: Mapping[str, Any] | None = None) -> Estimate:
+    """The Estimate on the rows of the measured positions; a rank-deficient W is told as by least squares."""
+    options = options_of(settings)
+    every = loop.measured()
+    names = columns_of(every, settings)
+    seen = every.columns(names)
+    base = ols.system(seen, EstimateSettings())
+    first = base.solve()
+    if first.rank < len(names):
+        return assemble(replace(base, settings=settings), first, model=model, provenance=provenance)
+
+    def update(runs: Sequence[Run], X: Array) -> Step:
+        Z = loop.instruments(runs).columns(names).W
+        s = _scales(seen, X, base.raw)
+        found = _solved(seen, Z, s)
+        norm = float(np.linalg.norm((seen.Y - seen.W @ found[0]) / np.repeat(s, seen.rows)))
+        return Step(found[0], found[1], norm, (Z, s, found[2]))
+
+    fixed = iterate(loop, every, names, options, update)
+    status, message = told(loop, fixed, options, "IV")
+    X, C = fixed.step.X, fixed.step.covariance
+    Z, s, A = fixed.step.kept
+    quality = _quality(seen, Z, s)
+    if quality["cond"] > CONDITION or quality["correlation"] < CORRELATION:
+        status = "weak-instruments" if status == "ok" else status
+        weak = (
+            f"The instruments do not explain W: condition {quality['cond']:.2g} of Z'VW, smallest correlation {quality['correlation']:.2g}. "
+            "Likely causes: another time base, reference or controller than those of the record; slow rows; parameters without excitation."
+        )
+        message = f"{weak} {message}".strip()
+    weighted = replace(base, settings=settings, weighted=base.raw.weighted(1 / s), scales=tuple(s.tolist()), known_variance=True)
+    least = weighted.solve()
+    told_first = outcome(weighted, least)
+    found = assemble(replace(weighted, iterations=len(fixed.trail)), replace(least, X=X), model=model, provenance=provenance)
+    residual = (seen.Y - seen.W @ X) / np.repeat(s**2, seen.rows)
+    U, U_least = _by_block(seen, Z, residual) @ A.T, _by_block(seen, seen.W, residual) @ least.T @ least.T.T
+    return replace(
+        found,
+        covariance=C,
+        sigma=np.sqrt(np.diag(C)),
+        sigma_corrected=np.sqrt(_scale(seen, len(names)) * np.einsum("kb,kb->b", U, U)),
+        status=status if told_first[0] == "ok" else told_first[0],
+        message=" ".join(part for part in (told_first[1], message) if part),
+        details={
+            "trail": trail_of(fixed),
+            "contraction": fixed.contraction,
+            **quality,
+            "hausman": hausman(names, X - least.X, np.sqrt(_scale(seen, len(names))) * (U - U_least)),
+        },
+    )
+
+
+def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
+    """Test of d, shape (b,), against its covariance U'U, U of shape (K, b) from K blocks."""
+    sigma = np.linalg.norm(U, axis=0)
+    z = np.abs(d) / np.where(sigma > 0, sigma, np.inf)
+    worst = int(np.argmax(z))
+    found: dict[str, Any] = {"largest": float(z[worst]), "parameter": names[worst]}
+    if len(U) >= 2 * len(d) and np.all(sigma > 0):
+        statistic = float(np.sum(np.linalg.lstsq((U / sigma).T, d / sigma, rcond=None)[0] ** 2))
+        found |= {"statistic": statistic, "probability": float(chi2.sf(statistic, len(d)))}
+    return found
+
+
+def _scales(seen: Observation, X: Array, raw: Any) -> Array:
+    """s_j, shape (n,), of the residual of X."""
+    share = max(1 - len(X) / raw.rows, 1 / raw.rows)
+    s = np.array([joint.residual_norm(X) / np.sqrt(max(joint.rows, 1) * share) for joint in raw.joints])
+    return wls.floored(raw, s)
+
+
+def _solved(seen: Observation, Z: Array, s: Array) -> tuple[Array, Array, Array]:
+    """X, C and A = (Z'VW)^-1."""
+    rows = np.repeat(1 / s, seen.rows)
+    W, Zw, Y = seen.W * rows[:, None], Z * rows[:, None], seen.Y * rows
+    size = np.linalg.norm(W, axis=0)
+    W, Zw = W / size, Zw / size
+    try:
+        A = np.linalg.inv(Zw.T @ W)
+    except LinAlgError:
+        raise InputError(
+            "the instruments do not explain W: Z'VW is singular; the simulated motion excites less than the measured one. Check controller and reference"
+        ) from None
+    X = A @ (Zw.T @ Y)
+    X += A @ (Zw.T @ (Y - W @ X))
+    C = A @ (Zw.T @ Zw) @ A.T
+    return X / size, C / np.outer(size, size), A / np.outer(size, size)
+
+
+def _quality(seen: Observation, Z: Array, s: Array) -> dict[str, float]:
+    """Condition of Z'VW with unit columns, smallest correlation of the two column spaces, smallest of a column with its own instrument."""
+    rows = np.repeat(1 / s, seen.rows)[:, None]
+    W, Zw = seen.W * rows, Z * rows
+    norms = np.linalg.norm(W, axis=0), np.maximum(np.linalg.norm(Zw, axis=0), 1e-300)
+    own = np.abs(np.einsum("ik,ik->k", W / norms[0], Zw / norms[1]))
+    spaces = np.linalg.svd(np.linalg.qr(Zw)[0].T @ np.linalg.qr(W)[0], compute_uv=False)
+    return {
+        "cond": float(np.linalg.cond((Zw / norms[1]).T @ (W / norms[0]))),
+        "correlation": float(spaces[-1]),
+        "column_correlation": float(own.min()),
+    }
+
+
+def _by_block(seen: Observation, Z: Array, residual: Array) -> Array:
+    """g_k = Z_k'(V (Y - W X))_k of every block k, shape (K, b); residual: V (Y - W X)."""
+    blocks = block_of_rows(seen, default_block(seen))
+    r, K = len(residual), int(blocks.max()) + 1
+    return np.asarray(csr_array((residual, (blocks, np.arange(r))), shape=(K, r)) @ Z)
+
+
+def _scale(seen: Observation, b: int) -> float:
+    """Correction of `runtime.estimators.correlated` for residuals that a fit has shrunk; nan where it has none."""
+    r, K = len(seen.Y), int(block_of_rows(seen, default_block(seen)).max()) + 1
+    return K / (K - 1) * (r - 1) / (r - b) if K > 1 and r > b else float("nan")
