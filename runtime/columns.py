@@ -114,10 +114,7 @@ def distinct_entries(model: GeneratedModel, constants: Mapping[str, float], colu
     columns = np.arange(len(model.BASE_PARAMETERS)) if columns is None else columns
     row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])
     k = columns[row]
-    rng = np.random.default_rng(0)
-    q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))
-    with np.errstate(all="ignore"):
-        values = model.regressor(q, qd, qdd, out=model.store(PROBES), **constants).transpose(2, 1, 0)[k, j]
+    values = _probed(model, constants)[k, j]
     if not np.isfinite(values).all():
         every = np.arange(len(k))
         return Entries(row, k, j, every, np.ones(len(k)), every)
@@ -125,3 +122,13 @@ def distinct_entries(model: GeneratedModel, constants: Mapping[str, float], colu
     _, source, which = np.unique(sign[:, None] * values + 0.0, axis=0, return_index=True, return_inverse=True)
     which = which.reshape(-1)
     return Entries(row, k, j, which, sign * sign[source][which], source)
+
+
+def _probed(model: GeneratedModel, constants: Mapping[str, float]) -> Array:
+    """The store at random states, shape (b, n, PROBES); nan where a loop does not close at one of them."""
+    q, qd, qdd = np.random.default_rng(0).uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))
+    try:
+        with np.errstate(all="ignore"):
+            return np.asarray(model.regressor(q, qd, qdd, out=model.store(PROBES), **constants).transpose(2, 1, 0))
+    except ValueError:  # what an emitted module of a general loop raises
+        return np.full((len(model.BASE_PARAMETERS), len(model.JOINTS), PROBES), np.nan)

@@ -1,7 +1,9 @@
 """The observed system: equal to the plain recipe, row bookkeeping, the steps that a resolution study repeats, several records as one."""
 
+import ast
 import dataclasses
 import types
+from pathlib import Path
 
 import emps_model
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 import scipy.signal
 from planar_data import TRUE, motion
 
-from runtime import Record, observe, stack, study_from_mapping
+from runtime import Record, load_model, observe, stack, study_from_mapping
 from runtime.columns import decimated_columns, distinct_entries, signals_of
 from runtime.errors import InputError
 from runtime.observation import decimated_torque, observation_from_states, select_rows
@@ -104,6 +106,28 @@ def test_states_out_of_reach_are_not_merged():
         regressor=regressor,
     )
     assert len(distinct_entries(model, {}).source) == 2
+
+
+def test_loops_that_do_not_close_at_random_states():
+    """The five-bar raises there; its identification treats every entry by itself."""
+    model = load_model(Path(__file__).parents[2] / "generated" / "five_bar.py")
+    entries = distinct_entries(model, {})
+    assert len(entries.source) == len(entries.k) == np.count_nonzero(model.STRUCTURE)
+
+
+def test_signals_are_those_found_over_a_finite_field():
+    """ENTRIES of the array target, derived exactly: the numbers find the same signals; constants are one signal there as here."""
+    folder = Path(__file__).parents[2] / "generated"
+    table = next(
+        n.value for n in ast.parse((folder / "tx40_xp.py").read_text()).body if isinstance(n, ast.Assign) and n.targets[0].id == "ENTRIES"
+    )
+    exact = {(k, j): (s, c) for k, j, s, c in ast.literal_eval(table)}
+    e = distinct_entries(load_model(folder / "tx40.py"), {})
+    assert set(exact) == set(zip(e.k.tolist(), e.j.tolist(), strict=True))
+    pairs = {
+        (w, *exact[k, j][:1], s * exact[k, j][1]) for k, j, w, s in zip(e.k.tolist(), e.j.tolist(), e.which.tolist(), e.sign, strict=True)
+    }
+    assert len(pairs) == len(e.source) == len({s for s, _ in exact.values()})  # one to one, the sign of each signal apart
 
 
 def test_blocks_equal_the_whole(record):
