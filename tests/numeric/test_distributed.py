@@ -8,12 +8,15 @@ from pathlib import Path
 
 import planar_2r_model as planar
 import pytest
+import typer
 from planar_data import record
+from typer.testing import CliRunner
 
 from runtime.cestac import cestac
 from runtime.errors import InputError
 from runtime.studies.distributed import results
 from runtime.study import CestacSettings, Lowpass, Signals, Study
+from symgen.cli.fleet import fleet
 
 dask = pytest.importorskip("distributed")
 
@@ -87,6 +90,18 @@ def test_a_dead_worker_loses_nothing(cluster, tmp_path):
 def test_a_failing_task_is_the_callers_error(cluster):
     with pytest.raises(ValueError, match="key 2"):
         list(results(failing, 2, range(5), cluster.scheduler_address))
+
+
+def test_fleet(cluster, emps_data, tmp_path):
+    (tmp_path / "fleet.yaml").write_text("jobs: [{robot: emps, record: emps}, {robot: emps, record: missing.csv}]")
+    app = typer.Typer()
+    app.command()(fleet)
+    here, there = (
+        CliRunner().invoke(app, [str(tmp_path / "fleet.yaml"), "--json", *options])
+        for options in ([], ["--scheduler", cluster.scheduler_address])
+    )
+    assert there.exit_code == here.exit_code == 1
+    assert there.stdout == here.stdout and '"status": "ok"' in here.stdout
 
 
 def test_no_scheduler():
