@@ -137,10 +137,10 @@ def _header(line: str, file: str) -> tuple[tuple[str, ...], bool, str | None]:
 
 def _table(lines: Sequence[str], numbers: Sequence[int], names: tuple[str, ...], delimiter: str | None, file: str) -> TextTable:
     """The table, if every line has one field per name."""
-    widths = map(len, map(str.split, lines)) if delimiter is None else (line.count(delimiter) + 1 for line in lines)
-    wrong = next(((k, width) for k, width in zip(numbers, widths, strict=True) if width != len(names)), None)
-    if wrong:
-        raise InputError(f"{wrong[1]} fields; expected {len(names)} ({', '.join(names)})", file=file, row=f"line {wrong[0]}")
+    widths = [len(line.split()) for line in lines] if delimiter is None else [line.count(delimiter) + 1 for line in lines]
+    if widths.count(len(names)) < len(widths):
+        k, width = next((k, width) for k, width in zip(numbers, widths, strict=True) if width != len(names))
+        raise InputError(f"{width} fields; expected {len(names)} ({', '.join(names)})", file=file, row=f"line {k}")
     return TextTable(file, names, tuple(lines), numbers, delimiter)
 
 
