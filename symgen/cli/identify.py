@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from symgen.cli.beside import Beside, beside
 from symgen.cli.session import (
     NEGATIVE,
     SIMULATED_WARNING,
@@ -22,15 +23,7 @@ from symgen.cli.session import (
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from runtime.estimate import Estimate
     from runtime.identification import Identification
-    from runtime.loads import Loads
-    from runtime.model import GeneratedModel
-    from runtime.record import Record
-    from runtime.record_stream import Stream
-    from runtime.study import Study
 
 
 def identify(
@@ -44,6 +37,12 @@ def identify(
         int | None,
         typer.Option(min=10, help="Read the records by blocks of so many samples; default: for large files, or as the study says."),
     ] = None,
+    physical: Annotated[
+        bool, typer.Option("--physical", help="Tell whether a physical robot can have these parameters (extra consistency).")
+    ] = False,
+    friction: Annotated[
+        bool, typer.Option("--friction", help="Friction against velocity, joint by joint, and the law it follows.")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print estimate.json instead of tables.")] = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD. Exit code 1 where the record does not determine them."""
@@ -61,32 +60,17 @@ def identify(
         model = in_target(robot, model, target)
         computed = {"target": target_of(model), "processor": processor()}
         found = identification(model, study, records, further=further, provenance={**origin(records), **computed})
-        loaded = weighed(model, study, folder, records)
+        more = beside(model, study, folder, records, found, origin(records), physical=physical, friction=friction)
         if output is not None:
-            write_all(output, identification_files(found, study_text(study, folder, output), loaded))
-        typer.echo(estimate_json(found, loaded) if json else console_text(found, loaded), nl=not json)
+            write_all(output, identification_files(found, study_text(study, folder, output), more))
+        typer.echo(estimate_json(found, more) if json else console_text(found, more), nl=not json)
         if output is not None:
             typer.echo(f"report: {output / 'report.html'}", err=True)
     if found.every.status == "rank-deficient":
         raise typer.Exit(NEGATIVE)
 
 
-def weighed(model: GeneratedModel, study: Study, folder: Path, records: Sequence[Record | Stream]) -> Loads | None:
-    """The load of the study, where it has one."""
-    if study.payload is None:
-        return None
-    from runtime.errors import InputError
-    from runtime.io.records import read_records
-    from runtime.loads import loads
-    from runtime.record import Record
-
-    whole = [record for record in records if isinstance(record, Record)]
-    if len(whole) < len(records):
-        raise InputError("a load is found on whole records; set stream: off")
-    return loads(model, study, whole, read_records(study.payload.record, model, folder=folder), provenance=origin(records))
-
-
-def console_text(found: Identification, loaded: Loads | None = None) -> str:
+def console_text(found: Identification, more: Beside | None = None) -> str:
     """Table of the essential parameters, trail, validation, trading parameters, coupling, then the verdict."""
     coupling = "\n".join(
         f"coupling of the drives in {key}: {fit.relative_error:.2f} % in total, per joint "
@@ -95,59 +79,47 @@ def console_text(found: Identification, loaded: Loads | None = None) -> str:
     )
     fit = found.carried if found.every.status != "rank-deficient" else found.every
     groups = "; ".join(", ".join(group) for group in found.weak.groups) or "none"
-    parts = [fit.to_table(), physical_text(fit), found.found.to_table(), *(part.to_table() for part in found.validation)]
+    parts = [fit.to_table(), found.found.to_table(), *(part.to_table() for part in found.validation)]
     parts += [f"parameters that trade against each other (|correlation| above {found.weak.threshold:g}): {groups}", coupling]
-    parts += ["" if loaded is None else loaded.to_table(), found.verdict]
+    parts += ["" if more is None else more.text(), found.verdict]
     return "\n\n".join(part for part in parts if part)
 
 
-def physical_text(fit: Estimate) -> str:
-    """Eigenvalues of a feasible estimate; empty for other methods."""
-    if "standard" not in fit.details:
-        return ""
-    from runtime.report.physical import eigenvalue_table
-
-    return eigenvalue_table(fit)
-
-
-def estimate_json(found: Identification, loaded: Loads | None = None) -> str:
+def estimate_json(found: Identification, more: Beside | None = None) -> str:
     """estimate.json: the Estimate of all parameters, and beside it the essential ones, validation, coupling and verdict."""
     import json
 
     from runtime.estimate import json_text
 
-    return json_text({**json.loads(found.every.to_json()), **found.summary(), **({} if loaded is None else loaded.summary())})
+    return json_text({**json.loads(found.every.to_json()), **found.summary(), **({} if more is None else more.summary())})
 
 
-def identification_files(found: Identification, study: str, loaded: Loads | None = None) -> dict[str, str | bytes]:
+def identification_files(found: Identification, study: str, more: Beside | None = None) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
     from runtime.report import plots
     from runtime.report.html import Page, Section, render
-    from runtime.report.loads import loads_section
-    from runtime.report.physical import physical_section, standard_csv
     from runtime.report.sections import identification_sections, parameters_csv, torque_unit
 
-    unit, physical = torque_unit(found), "standard" in found.every.details
+    unit = torque_unit(found)
     overlay, residuals = plots.torque_overlay(found.comparison, unit, found.source), plots.residual_histogram(found.comparison, unit)
     settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
-    own = [*([physical_section(found.every)] if physical else []), *([] if loaded is None else [loads_section(loaded)])]
     page = Page(
         title=f"{found.model.NAME}: identification on {found.name}",
         warning=SIMULATED_WARNING if found.source == "simulated" else "",
         verdict=found.verdict,
-        sections=[*identification_sections(found), *own, settings],
+        sections=[*identification_sections(found), *([] if more is None else more.sections()), settings],
         footer=provenance_line(found),
     )
     return {
         "report.html": render(page),
-        "estimate.json": estimate_json(found, loaded),
+        "estimate.json": estimate_json(found, more),
         "parameters.csv": parameters_csv(found),
         "parameters.tex": found.carried.to_latex(),
         "study.yaml": study,
         "torques.png": plots.png(overlay),
         "torques.svg": plots.svg(overlay),
         "residuals.png": plots.png(residuals),
-        **({"standard_parameters.csv": standard_csv(found.every)} if physical else {}),
+        **({} if more is None else more.files()),
     }
 
 

@@ -81,3 +81,22 @@ def test_feasible(folder, tmp_path) -> None:
 def test_bad_input_is_one_line_and_exit_code_2(folder, text: str, said: str) -> None:
     result = run(folder, text)
     assert result.exit_code == 2 and said in result.output and "Traceback" not in result.output
+
+
+def test_friction_and_physical_options(folder, tmp_path) -> None:
+    result = run(folder, "", "-o", str(tmp_path / "out"), "--friction", "--physical")
+    assert result.exit_code == 0, result.output
+    assert "The parameters are physically feasible" in result.output and "held out %" in result.output
+    found = json.loads((tmp_path / "out" / "estimate.json").read_text())
+    assert found["feasibility"]["feasible"] and found["feasibility"]["margin"] > 0
+    assert [curve["joint"] for curve in found["friction"]] == ["1", "2"] and len(found["friction"][0]["laws"]) == 5
+    assert (tmp_path / "out" / "friction.png").read_bytes()[:4] == b"\x89PNG"
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert "Friction curves" in report and "Physical consistency" in report
+
+
+def test_infeasible_least_squares_is_told(tx40_data) -> None:
+    result = CliRunner().invoke(app, ["identify", "tx40", "tx40", "--physical", "--json"])
+    assert result.exit_code == 0
+    told = json.loads(result.stdout)["feasibility"]
+    assert not told["feasible"] and told["blocking"][0]["condition"] == "link 3"
