@@ -142,15 +142,15 @@ class Decimation:
         if b1 > b0:
             blocks = u[:, start - t0 : start - t0 + (b1 - b0) * p.L].reshape(-1, p.L)
             self.products[b0:b1] = (blocks @ p.PQY).reshape(len(u), b1 - b0, -1).swapaxes(0, 1)
-        _copy(u, t0, self.first, 0)
-        _copy(u, t0, self.last, p.N - self.last.shape[1])
+        copy_overlap(u, t0, self.first, 0)
+        copy_overlap(u, t0, self.last, p.N - self.last.shape[1])
 
     def result(self) -> Array:
         """The kept samples, shape (S, K)."""
         p, x, v = self.plan, self.x, self.v
         (blocks, S, m2), K = v.shape, p.blocks * p.G
         x[0] = self.first @ p.X0
-        _recursion(p.step, x, self.products[..., :m2])
+        recursion(p.step, x, self.products[..., :m2])
         end = self.last @ p.A + x[-1] @ p.Ax
         y = np.empty((S, p.K))
         y[:, K:] = end[:, m2:]
@@ -158,7 +158,7 @@ class Decimation:
             v[-1] = end[:, :m2]
             states = x[:-1].reshape(-1, m2)
             drive = self.products[..., m2 : 2 * m2] + (states @ p.Mx).reshape(v.shape)
-            _recursion(p.step, v[::-1], drive[:0:-1])
+            recursion(p.step, v[::-1], drive[:0:-1])
             outputs = self.products[..., 2 * m2 :] + (states @ p.Yx + v.reshape(-1, m2) @ p.Yv).reshape(blocks, S, -1)
             y[:, :K] = outputs.swapaxes(0, 1).reshape(S, K)
         return y
@@ -172,7 +172,7 @@ def decimate(u: Array, plan: Plan) -> Array:
     return decimation.result()
 
 
-def _recursion(a: Array, x: Array, drive: Array) -> None:
+def recursion(a: Array, x: Array, drive: Array) -> None:
     """x_(b+1) = a x_b + drive_b: x, shape (B + 1, S, 2 m), x_0 given; drive, shape (B, S, 2 m)."""
     z = x.view(complex)
     for b, d in enumerate(drive.view(complex)):
@@ -180,7 +180,7 @@ def _recursion(a: Array, x: Array, drive: Array) -> None:
         z[b + 1] += d
 
 
-def _copy(u: Array, t0: int, window: Array, start: int) -> None:
+def copy_overlap(u: Array, t0: int, window: Array, start: int) -> None:
     """What u, samples from t0 on, holds of `window`, samples from `start` on."""
     a, b = max(t0, start), min(t0 + u.shape[1], start + window.shape[1])
     if a < b:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -147,6 +147,21 @@ class Queue:
 
     def take(self, count: int) -> Array:
         """The first `count` of those that wait."""
-        whole = np.concatenate(self.parts)
-        self.parts, self.count = [whole[count:]], self.count - count
-        return whole[:count]
+        if len(self.parts[0]) < count:
+            self.parts = [np.concatenate(self.parts)]
+        head = self.parts[0]
+        self.parts[0], self.count = head[count:], self.count - count
+        return head[:count]
+
+
+def recut(blocks: Iterable[tuple[Array, ...]], lengths: Iterable[int]) -> Iterator[tuple[Array, ...]]:
+    """The same samples in blocks of these lengths; every array of a block has its length."""
+    queues: list[Queue] = []
+    source = iter(blocks)
+    for length in lengths:
+        while not queues or queues[0].count < length:
+            block = next(source)
+            queues = queues or [Queue() for _ in block]
+            for queue, x in zip(queues, block, strict=True):
+                queue.put(x)
+        yield tuple(queue.take(length) for queue in queues)

@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from scipy.signal import sosfilt, sosfilt_zi
 
-from runtime.decimation import Plan
+from runtime.decimation import Plan, copy_overlap, recursion
 from runtime.signals import butterworth, derivative, median_filtered, require_longer
 from runtime.study import Lowpass, Signals
 
@@ -110,69 +110,71 @@ class ZeroPhase:
 
 
 class StreamedDecimation:
-    """`decimation.decimate` by one plan, of signals that come in any pieces: rows (S, B) in, kept samples (S, k) out."""
+    """`decimation.Decimation` of signals that come in any pieces: rows (S, B) in, kept samples (S, k) out. Pieces of whole blocks are not copied."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan, self.ahead = plan, ceil(log(TRUNCATION) / log(np.abs(plan.step).max()))
-        self.raw, self.base = np.empty((0, 0)), 0  # samples still needed, and the number of the first one
+        self.taken = 0  # samples so far
+        self.first, self.last = np.empty((0, 0)), np.empty((0, 0))  # of the record, as in Decimation
+        self.rest = np.empty((0, 0))  # samples behind the last block that was complete
         self.block = 0  # blocks the forward recursion has passed
-        self.x: Array | None = None  # its state, complex, shape (S, m)
-        self.drive: list[Array] = []  # of the backward recursion, complex, shape (S, m), by block not yet returned
-        self.known: list[Array] = []  # the part of y that does not depend on what follows, shape (S, G), by block
+        self.x: Array | None = None  # its state, shape (S, 2 m)
+        self.waiting: list[tuple[Array, Array]] = []  # drive of the backward recursion (B, S, 2 m), and y without its effect (B, S, G)
+        self.count = 0  # blocks that wait
 
     def push(self, u: Array) -> Array:
         """Kept samples of all blocks but the last `ahead` ones, when there are at least twice as many."""
-        p = self.plan
-        self.raw = np.concatenate([self.raw.reshape(len(u), -1), u], axis=1)
-        if self.x is None:
-            if self.raw.shape[1] < len(p.X0):
-                return u[:, :0]
-            self.x = (self.raw[:, : len(p.X0)] @ p.X0).view(complex)
-        self._forward()
-        count = len(self.drive) - self.ahead
-        if count < 2 * self.ahead:
-            return u[:, :0]
-        y = self._backward(np.zeros_like(self.x), count)
-        self.drive, self.known = self.drive[count:], self.known[count:]
-        return y
+        p, t0 = self.plan, self.taken
+        if not t0:
+            self.first, self.last, self.rest = np.empty((len(u), len(p.X0))), np.empty((len(u), len(p.A))), u[:, :0]
+        self.taken += u.shape[1]
+        copy_overlap(u, t0, self.first, 0)
+        copy_overlap(u, t0, self.last, p.N - len(p.A))
+        u = np.concatenate([self.rest, u], axis=1) if self.rest.size else u
+        if self.x is None and self.taken >= len(p.X0):
+            self.x, u = self.first @ p.X0, u[:, p.phase :]
+        if self.x is not None:
+            u = self._forward(self.x, u)
+        self.rest = u.copy()
+        count = self.count - self.ahead
+        return self._backward(np.zeros((len(u), len(p.Mx))), count) if count >= 2 * self.ahead else u[:, :0]
 
     def finish(self) -> Array:
         """The kept samples at the end of the record."""
         p = self.plan
         if self.x is None:
-            require_longer(self.raw.shape[1], len(p.X0) - 1)
-            raise ValueError(f"{self.raw.shape[1]} samples were pushed; the plan is for {p.N}")
-        end = self.raw[:, -len(p.A) :] @ p.A + self.x.view(float) @ p.Ax
+            raise ValueError(f"{self.taken} samples were pushed; the plan is for {p.N}")
+        end = self.last @ p.A + self.x @ p.Ax
         m2 = len(p.Mx)
-        v = np.ascontiguousarray(end[:, :m2]).view(complex)
-        return np.concatenate([self._backward(v, len(self.drive)), end[:, m2:]], axis=1)
+        return np.concatenate([self._backward(end[:, :m2], self.count), end[:, m2:]], axis=1)
 
-    def _forward(self) -> None:
-        p, S, x = self.plan, len(self.raw), self.x
-        assert x is not None
-        stop = min(p.blocks, (self.base + self.raw.shape[1] - p.phase) // p.L)
-        start = p.phase + self.block * p.L - self.base
-        blocks = self.raw[:, start : start + max(stop - self.block, 0) * p.L].reshape(-1, p.L)
-        products = (blocks @ p.PQY).reshape(S, -1, p.PQY.shape[1])
-        m2 = len(p.Mx)
-        for b in range(products.shape[1]):
-            P, Q, Y = np.split(products[:, b], [m2, 2 * m2], axis=1)
-            pairs = x.view(float)
-            self.drive.append((Q + pairs @ p.Mx).view(complex))
-            self.known.append(Y + pairs @ p.Yx)
-            x = p.step * x + np.ascontiguousarray(P).view(complex)
-        self.x, self.block = x, max(stop, self.block)
-        needed = max(min(p.phase + self.block * p.L - self.base, self.raw.shape[1] - len(p.A)), 0)
-        self.raw, self.base = self.raw[:, needed:].copy(), self.base + needed
+    def _forward(self, x: Array, u: Array) -> Array:
+        """Pass the blocks that are complete in u, the samples from the next block on; returns what is left of u."""
+        p, S, m2 = self.plan, len(u), len(self.plan.Mx)
+        B = min(p.blocks - self.block, u.shape[1] // p.L)
+        if B < 1:
+            return u
+        products = (u[:, : B * p.L].reshape(-1, p.L) @ p.PQY).reshape(S, B, -1).swapaxes(0, 1)
+        states = np.empty((B + 1, S, m2))
+        states[0] = x
+        recursion(p.step, states, np.ascontiguousarray(products[..., :m2]))
+        self.x, before = states[-1], states[:-1].reshape(-1, m2)
+        drive = products[..., m2 : 2 * m2] + (before @ p.Mx).reshape(B, S, m2)
+        self.waiting.append((drive, products[..., 2 * m2 :] + (before @ p.Yx).reshape(B, S, -1)))
+        self.block, self.count = self.block + B, self.count + B
+        return u[:, B * p.L :]
 
     def _backward(self, v: Array, count: int) -> Array:
-        """y of the first `count` blocks that wait, from v behind the last of them that has come."""
-        y = []
-        for b in range(len(self.drive) - 1, -1, -1):
-            if b < count:
-                y.append(self.known[b] + v.view(float) @ self.plan.Yv)
-            v = self.plan.step * v + self.drive[b]
-        return np.concatenate([v.real[:, :0], *y[::-1]], axis=1)
+        """y of the first `count` blocks that wait, from v at the end of the last of them."""
+        if not self.count:
+            return np.empty((len(v), 0))
+        drive, known = (np.concatenate(x) for x in zip(*self.waiting, strict=True))
+        states = np.empty_like(drive)
+        states[-1] = v
+        recursion(self.plan.step, states[::-1], drive[:0:-1])
+        y = known[:count] + (states[:count].reshape(-1, states.shape[2]) @ self.plan.Yv).reshape(count, len(v), -1)
+        self.waiting, self.count = [(drive[count:], known[count:])], self.count - count
+        return np.asarray(y.swapaxes(0, 1).reshape(len(v), -1))
 
 
 class Chain:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -21,7 +22,7 @@ from runtime.estimators.correlated import BLOCKS, SHORTEST
 from runtime.estimators.reduction import Reduction, Segment, SegmentFactors, Window
 from runtime.model import GeneratedModel
 from runtime.observation import Observation, all_files, stack
-from runtime.record_stream import Queue, Stream
+from runtime.record_stream import Queue, Stream, recut
 from runtime.rows import per_joint
 from runtime.signals import States, decimation_factor, decimation_plan, kept_samples
 from runtime.stages import Chain, Stage, StreamedDecimation, derivative_stage, median_stage, position_stage, velocity_stage
@@ -162,28 +163,32 @@ def decimated_blocks(
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
     """Time (k,), mask (n, k), distinct signals (S, k) and torques (n, k) of the kept instants, by blocks."""
     speeds = per_joint(study.rows.low_speed, stream.n, "rows.low_speed")
-    plan = decimation_plan(at.stop - at.start, at.factor, study.signals.decimate)
-    decimation = None if plan is None else StreamedDecimation(plan)
-    evaluate, S = DistinctSignals(model, entries, constants), len(entries.source)
+    N = at.stop - at.start
+    plan = decimation_plan(N, at.factor, study.signals.decimate)
+    whole, torques = (Chain() if plan is None else StreamedDecimation(plan) for _ in range(2))
+    evaluate = DistinctSignals(model, entries, constants)
     times, masks = Queue(), Queue()
     k = 0
 
-    def ready(y: Array) -> Iterator[tuple[Array, Array, Array, Array]]:
+    def ready(y: Array, Y: Array) -> Iterator[tuple[Array, Array, Array, Array]]:
         if y.shape[1]:
-            yield times.take(y.shape[1]), masks.take(y.shape[1]).T, y[:S], y[S:]
+            yield times.take(y.shape[1]), masks.take(y.shape[1]).T, y, Y
 
-    for begin, (t, q, qd, qdd, tau) in _windowed(filtered_blocks(stream, study.signals), at):
-        kept = _kept(begin, len(t), at)
+    pieces = uniform_pieces(N) if plan is None else plan.pieces(EVALUATED)
+    blocks = (block for _, block in _windowed(filtered_blocks(stream, study.signals), at))
+    for (begin, end), (t, q, qd, qdd, tau) in zip(pieces, recut(blocks, [b - a for a, b in pieces]), strict=True):
+        kept = _kept(begin, end - begin, at)
         mask = _mask(k, qd[kept], speeds, study.rows.trim, at)
         k += mask.shape[1]
         times.put(t[kept])
         masks.put(mask.T)
-        for a in range(0, len(t), EVALUATED):
-            part = slice(a, a + EVALUATED)
-            u = np.vstack([evaluate(States(q[part], qd[part], qdd[part])), tau[part].T])
-            yield from ready(u if decimation is None else decimation.push(u))
-    if decimation is not None:
-        yield from ready(decimation.finish())
+        yield from ready(whole.push(evaluate(States(q, qd, qdd))), torques.push(tau.T))
+    yield from ready(whole.finish(), torques.finish())
+
+
+def uniform_pieces(N: int) -> list[tuple[int, int]]:
+    """[t0, t1) of N samples, EVALUATED at a time."""
+    return list(pairwise([*range(0, N, EVALUATED), N]))
 
 
 def filtered_blocks(stream: Stream, signals: Signals) -> Iterator[tuple[Array, Array, Array, Array, Array]]:

@@ -79,7 +79,7 @@ def test_decimation_does_not_hold_the_record():
     stage = StreamedDecimation(plan(200_000, 10, 0, 27))
     for part in pieces(walk(200_000, 1), 1000):
         stage.push(part.T)
-        assert stage.raw.shape[1] < 1500 and len(stage.drive) < 4 * stage.ahead + 100
+        assert stage.rest.shape[1] < 1500 and stage.count < 4 * stage.ahead + 100
 
 
 @pytest.mark.parametrize(
