@@ -12,7 +12,7 @@ from runtime.report.plots import BLUE, GREY, ORANGE, STYLE, panels_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from runtime.studies.simulation import Simulation
+    from runtime.simulation_result import Simulation
 
 
 def simulation_figure(joints: Sequence[int], found: Simulation, units: Sequence[tuple[str, str]]) -> Figure:

@@ -12,7 +12,6 @@ the sampled loop stable along the reference: what is not raises SimulationError,
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -25,60 +24,19 @@ from runtime.control_law import ControlLaw, continuous_pole, control_law, discre
 from runtime.controller_settings import Controller
 from runtime.errors import InputError, SettingsError
 from runtime.model import GeneratedModel
-from runtime.record import Record
 from runtime.reference import Reference
+from runtime.simulation_result import Sensitivity, Simulation, SimulationError
 from runtime.studies.simulation_friction import DryFriction, dry_friction
-from runtime.studies.simulation_loop import compiled, tick_function
+from runtime.studies.simulation_loop import Plan, blocks, compiled, tick_function
+from runtime.studies.simulation_tangent import tangent_along, tangent_function
 from runtime.symbolic_model import SymbolicModel, load_symbolic
 
 Array = np.ndarray
 
 POINTS = 12  # of the reference where inertia and poles are looked at
-BLOCK = 250  # ticks in one call
+BLOCK, TANGENT_BLOCK = 250, 25  # ticks in one call
 UNSTABLE = 1 + 1e-6  # modulus of a discrete pole
 FAR = 1e3  # times the range of the reference, plus 1 rad or m: the loop has left it
-
-
-class SimulationError(InputError):
-    """A run that cannot be made: inertia not positive definite, loop unstable, motion lost. `time` : s, where it was seen."""
-
-    def __init__(self, message: str, *, time: float) -> None:
-        self.time = time
-        super().__init__(message)
-
-
-@dataclass(frozen=True, eq=False)
-class Simulation:
-    """A run, at the recorded ticks; arrays of shape (N, n), joint side, SI.
-
-    q, qd, qdd, tau : exact states, and the torque on the arm without the disturbance.   q_measured, tau_measured : what a record would hold.
-    saturated : share of ticks with the torque at its limit, per joint.   state : last state of the loop, for a run that goes on.
-    """
-
-    t: Array
-    q: Array
-    qd: Array
-    qdd: Array
-    tau: Array
-    q_measured: Array
-    tau_measured: Array
-    q_r: Array
-    rate: float
-    saturated: Array
-    substeps: int
-    state: Array = field(repr=False)
-    name: str = "simulation"
-
-    def record(self) -> Record:
-        """What was measured, with its reference."""
-        return Record(self.t, self.q_measured, self.tau_measured, self.rate, self.name, {}, self.q_r)
-
-    def to_csv(self) -> str:
-        """t, q1 ..., tau1 ..., qr1 ...: the measured columns, SI, joint side, as `identify` reads them."""
-        n = self.q.shape[1]
-        names = ["t", *(f"{x}{j}" for x in ("q", "tau", "qr") for j in range(1, n + 1))]
-        rows = np.column_stack([self.t, self.q_measured, self.tau_measured, self.q_r])
-        return "\n".join([",".join(names), *(",".join(f"{x:.10g}" for x in row) for row in rows), ""])
 
 
 class Simulator:
@@ -105,6 +63,7 @@ class Simulator:
         self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
         self._ticks: dict[int, Any] = {}
         self._blocks: dict[int, Any] = {}
+        self._tangents: dict[int, Any] = {}
         self._bias = _rest_functions(self.symbolic, self.constants)
 
     def run(
@@ -126,35 +85,80 @@ class Simulator:
         ideal : no noise, no steps of encoder and converter.   disturbance : torques on the arm that are not recorded, (N, n).
         feedforward : torques added to the command, (N, n), in place of those of the settings.   seed : of the noise; default: that of the settings.
         """
+        plan = self._plan(X, reference, g, start, disturbance, feedforward, None if ideal else seed or self.controller.seed)
+        states, out = self._iterated(plan)
+        return self._result(plan, states, out, reference, name)
+
+    def sensitivity(
+        self,
+        X: Array,
+        reference: Reference,
+        *,
+        g: Array | float = 1.0,
+        start: Array | None = None,
+        disturbance: Array | None = None,
+        feedforward: Array | None = None,
+    ) -> tuple[Simulation, Sensitivity]:
+        """An ideal run and its derivatives by X, from the tangent system stepped beside it (`simulation_tangent`)."""
+        plan = self._plan(X, reference, g, start, disturbance, feedforward, None)
+        states, out = self._iterated(plan)
+        found = self._result(plan, states, out, reference, "simulation")
+        if plan.substeps not in self._tangents:
+            tick = tangent_function(self.symbolic, self.friction, self.constants, plan.substeps, self.controller.integrator)
+            self._tangents[plan.substeps] = (compiled(tick) if self._in_c else tick).mapaccum(TANGENT_BLOCK)
+        before = np.vstack([plan.x, states[:-1]])
+        tangent = tangent_along(self._tangents[plan.substeps], before, plan, self.law.flags, TANGENT_BLOCK, self.controller.record_every)
+        return found, tangent
+
+    def _plan(
+        self,
+        X: Array,
+        reference: Reference,
+        g: Array | float,
+        start: Array | None,
+        disturbance: Array | None,
+        feedforward: Array | None,
+        seed: int | None,
+    ) -> Plan:
+        """seed : None for an ideal run."""
         n, N = len(self.model.JOINTS), len(reference)
         X, g = self._parameters(X), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
         _check_shapes(reference, self.controller.rate, n, N, disturbance, feedforward)
         substeps = self.substeps(X, reference, g)
-        rng = np.random.default_rng(self.controller.seed if seed is None else seed)
-        noise, pushed, torque_noise = (np.zeros((N, n)),) * 3 if ideal else self._noise(rng, N)
+        noise, pushed, torque_noise = (np.zeros((N, n)),) * 3 if seed is None else self._noise(np.random.default_rng(seed), N)
         pushed = pushed if disturbance is None else pushed + np.asarray(disturbance)
         known = self._feedforward(reference) if feedforward is None else np.asarray(feedforward)
         signals = np.hstack([reference.q, reference.qd, known + self.law.ca * reference.qdd, noise, pushed])
-        law = self.law.matrix(g, ideal=ideal)
-        x = self._start(X, reference, known[0], law, start, substeps, ideal=ideal)
-        states, out = self._iterated(substeps, x, signals, X, law)
-        q, qd = states[:, :n], states[:, n : 2 * n]
-        y, tau, qdd = np.split(out, 3, axis=1)
-        _check_motion(q, reference)
-        kept = slice(None, None, self.controller.record_every)
-        bound = g * self.law.saturation
-        return Simulation(
-            t=reference.t[kept],
-            q=np.vstack([x[:n], q[:-1]])[kept],
-            qd=np.vstack([x[n : 2 * n], qd[:-1]])[kept],
-            qdd=qdd[kept],
-            tau=tau[kept],
-            q_measured=y[kept],
-            tau_measured=(tau + torque_noise)[kept],
-            q_r=reference.q[kept],
-            rate=self.controller.rate / self.controller.record_every,
-            saturated=(np.abs(tau) >= bound * (1 - 1e-9)).mean(axis=0),
+        settling = round(self.controller.settle * self.controller.rate) if self.law.K.any() else 0
+        still = np.concatenate([reference.q[0], np.zeros(n), known[0], np.zeros(2 * n)])
+        return Plan(
+            x=self._start(reference, start, ideal=seed is None),
+            signals=np.vstack([np.tile(still, (settling, 1)), signals]),
+            settling=settling,
+            X=X,
+            g=g,
+            law=self.law.matrix(g, ideal=seed is None),
             substeps=substeps,
+            torque_noise=torque_noise,
+        )
+
+    def _result(self, plan: Plan, states: Array, out: Array, reference: Reference, name: str) -> Simulation:
+        n, every = len(self.model.JOINTS), self.controller.record_every
+        _check_motion(states[plan.settling :, :n], reference)
+        before = np.vstack([plan.x, states[:-1]])[plan.settling :]
+        y, tau, qdd = np.split(out[plan.settling :], 3, axis=1)
+        return Simulation(
+            t=reference.t[::every],
+            q=before[::every, :n],
+            qd=before[::every, n : 2 * n],
+            qdd=qdd[::every],
+            tau=tau[::every],
+            q_measured=y[::every],
+            tau_measured=(tau + plan.torque_noise)[::every],
+            q_r=reference.q[::every],
+            rate=self.controller.rate / every,
+            saturated=(np.abs(tau) >= plan.g * self.law.saturation * (1 - 1e-9)).mean(axis=0),
+            substeps=plan.substeps,
             state=states[-1],
             name=name,
         )
@@ -188,34 +192,27 @@ class Simulator:
             self._ticks[substeps] = compiled(tick) if self._in_c else tick
         return self._ticks[substeps]
 
-    def _iterated(self, substeps: int, x: Array, signals: Array, X: Array, law: Array) -> tuple[Array, Array]:
-        """Ticks along signals (N, 5n), BLOCK at a time: states after each tick (N, 6n), outputs (N, 3n)."""
-        if substeps not in self._blocks:
-            self._blocks[substeps] = self.tick(substeps).mapaccum(BLOCK)
-        states, out = [], []
-        for k in range(0, len(signals), BLOCK):
-            rows = signals[k : k + BLOCK]
-            padded = np.vstack([rows, np.repeat(rows[-1:], BLOCK - len(rows), axis=0)])
-            found = self._blocks[substeps](x, padded.T, X, law, self.law.flags)
-            states.append(found[0].full().T[: len(rows)])
-            out.append(found[1].full().T[: len(rows)])
+    def _iterated(self, plan: Plan) -> tuple[Array, Array]:
+        """BLOCK ticks at a time: states after each tick (S + N, 6n), outputs y, tau, qdd (S + N, 3n)."""
+        if plan.substeps not in self._blocks:
+            self._blocks[plan.substeps] = self.tick(plan.substeps).mapaccum(BLOCK)
+        x, states, out = plan.x, [], []
+        for rows, used in blocks(plan.signals, BLOCK):
+            found = self._blocks[plan.substeps](x, rows.T, plan.X, plan.law, self.law.flags)
+            states.append(found[0].full().T[:used])
+            out.append(found[1].full().T[:used])
             x = states[-1][-1]
         return np.vstack(states), np.vstack(out)
 
-    def _start(self, X: Array, reference: Reference, known: Array, law: Array, start: Array | None, substeps: int, *, ideal: bool) -> Array:
-        """State of the loop at t = 0: at rest; where there is an integral, after `settle` s on the first reference point."""
+    def _start(self, reference: Reference, start: Array | None, *, ideal: bool) -> Array:
+        """State of the loop, (6n,), at rest."""
         n = len(self.model.JOINTS)
         given = self.controller.start if start is None else start
         q = np.asarray(reference.q[0] if given is None else given, dtype=float)
         if q.shape != (n,) or not np.isfinite(q).all():
             raise InputError(f"start {q}; expected {n} finite joint positions")
         y = q if ideal else self.law.seen(q)
-        x = np.concatenate([q, np.zeros(n), y, y, np.zeros(2 * n)])
-        N = round(self.controller.settle * self.controller.rate)
-        if not self.law.K.any() or not N:
-            return x
-        still = np.concatenate([reference.q[0], np.zeros(n), known, np.zeros(2 * n)])
-        return np.asarray(self._iterated(substeps, x, np.tile(still, (N, 1)), X, law)[0][-1])
+        return np.concatenate([q, np.zeros(n), y, y, np.zeros(2 * n)])
 
     def _feedforward(self, reference: Reference) -> Array:
         """Torque of the reference with the parameters of the robot file, (N, n), where the settings ask for it."""

@@ -108,16 +108,16 @@ def _masked(D: SX, rows: SX) -> SX:
     return ca.diag(rows) @ D @ ca.diag(rows) + ca.diag(1 - rows) + EQUAL * ca.diag(ca.diag(D))
 
 
-def rest_function(friction: DryFriction) -> Any:
+def rest_function(friction: DryFriction, columns: int = 1) -> Any:
     """(qd, Y, at_rest) -> qd with the slips marked 1 at zero: the nearest velocity in the metric of A, so that kinetic energy only falls.
 
-    Of a displacement in place of qd: elements that rest over the step do not creep.
+    Of a displacement in place of qd: elements that rest over the step do not creep. qd : (n, columns).
     """
     m, n = friction.G.shape
-    qd, Y, rows = ca.SX.sym("qd", n), ca.SX.sym("Y", n, m), ca.SX.sym("rows", m)
+    qd, Y, rows = ca.SX.sym("qd", n, columns), ca.SX.sym("Y", n, m), ca.SX.sym("rows", m)
     G = ca.DM(friction.G)
-    impulse = solve(_masked(G @ Y, rows), rows * (G @ qd))
-    return ca.Function("rest", [qd, Y, rows], [qd - Y @ (rows * impulse)], ["qd", "Y", "rows"], ["qd1"])
+    impulse = solve(_masked(G @ Y, rows), ca.diag(rows) @ G @ qd)
+    return ca.Function("rest", [qd, Y, rows], [qd - Y @ ca.diag(rows) @ impulse], ["qd", "Y", "rows"], ["qd1"])
 
 
 def event_function(friction: DryFriction) -> Any:

@@ -12,22 +12,46 @@ from __future__ import annotations
 
 import ctypes
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from runtime.control_law import VECTORS
 from runtime.studies.compile_cache import FallbackWarning, NotCompiledError, cache_folder, shared_object
-from runtime.studies.simulation_friction import DryFriction, event_function, friction_function, rest_function
+from runtime.studies.simulation_friction import REST, DryFriction, event_function, friction_function, rest_function
 from runtime.symbolic_model import SymbolicModel
 
+Array = np.ndarray
 MX = Any  # casadi.MX
 
 ROUNDS = 4  # slips that may stop within one substep; the last round keeps what is left of it whole
 FLAGS = ("-std=c11", "-O2", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-shared", "-fPIC")
 CVODES = {"abstol": 1e-10, "reltol": 1e-9}
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A run in numbers: state x (6n,) at the first tick, signals (S + N, 5n) of which the first S only settle, noise of the recorded torque (N, n)."""
+
+    x: Array
+    signals: Array
+    settling: int
+    X: Array
+    g: Array
+    law: Array
+    substeps: int
+    torque_noise: Array
+
+
+def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
+    """`size` rows at a time, the last ones filled up with copies of the last, and how many of them count."""
+    for k in range(0, len(rows), size):
+        found = rows[k : k + size]
+        yield np.vstack([found, np.repeat(found[-1:], size - len(found), axis=0)]), len(found)
 
 
 def tick_function(model: SymbolicModel, friction: DryFriction, constants: Mapping[str, float], substeps: int, integrator: str) -> Any:
@@ -88,47 +112,71 @@ def plant_function(model: SymbolicModel, friction: DryFriction, constants: dict[
     Where every slip keeps its direction, one step of the flow; otherwise rounds, each until the next slip stops.
     """
     n, m = friction.G.shape[1], len(friction.G)
-    q, qd, tau, X = ca.MX.sym("q", n), ca.MX.sym("qd", n), ca.MX.sym("tau", n), ca.MX.sym("X", len(model.BASE_PARAMETERS))
-    plus, minus, h = ca.MX.sym("plus", m), ca.MX.sym("minus", m), ca.MX.sym("h")
-    inputs = [q, qd, tau, X, plus, minus, h]
-    flow = (_cvodes if integrator == "cvodes" else _runge_kutta)(model, constants)
+    inputs = plant_inputs(model, friction)
+    q, qd, tau, X, plus, minus, h = inputs
+    flow = flow_function(model, constants, integrator)
     if not m:
         return ca.Function("plant", inputs, list(flow(q, qd, tau, X, h)))
-    G = ca.DM(friction.G)
-    direction = ca.sign(G @ qd)
-    f = (direction > 0) * plus - (direction < 0) * minus
-    sliding = flow(q, qd, tau - G.T @ f, X, h)
-    calm = ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ sliding[1]))) > 1e-9
+    f, direction = sliding_friction(friction, qd, plus, minus)
+    sliding = flow(q, qd, tau - ca.DM(friction.G).T @ f, X, h)
+    calm = keeps_sliding(friction, direction, qd, sliding[1])
     given = [*inputs, *(ca.MX.sym(name, n) for name in ("q1", "qd1", "qdd"))]
     done = ca.Function("sliding", given, given[7:])
     stopping = ca.Function("stopping", given, list(_rounds(model, friction, constants, flow)(*inputs)))
     return ca.Function("plant", inputs, list(ca.Function.if_else("either", done, stopping)(calm, *inputs, *sliding)))
 
 
+def sliding_friction(friction: DryFriction, qd: MX, plus: MX, minus: MX) -> tuple[MX, MX]:
+    """f and direction of every element where all of them slide."""
+    direction = ca.sign(ca.DM(friction.G) @ qd)
+    return (direction > 0) * plus - (direction < 0) * minus, direction
+
+
+def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
+    """Whether every slip keeps its direction from qd to `end`."""
+    G = ca.DM(friction.G)
+    return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > REST
+
+
+def flow_function(model: SymbolicModel, constants: dict[str, float], integrator: str) -> Any:
+    """(q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start."""
+    return (_cvodes if integrator == "cvodes" else _runge_kutta)(model, constants)
+
+
 def _rounds(model: SymbolicModel, friction: DryFriction, constants: dict[str, float], flow: Any) -> Any:
     """The plant where slips stop or rest: each round lasts until the next slip stops."""
-    n, m, b = friction.G.shape[1], len(friction.G), len(model.BASE_PARAMETERS)
-    force, event, rest = friction_function(model, friction, constants), event_function(friction), rest_function(friction)
-    names = {"q": n, "qd": n, "tau": n, "X": b, "plus": m, "minus": m, "h": 1}
-    inputs = [ca.MX.sym(name, rows) for name, rows in names.items()]
-
-    def one(whole: int) -> list[MX]:
-        q, qd, tau, X, plus, minus, h = inputs
-        f, direction, qdd, Y = force(q, qd, tau, X, plus, minus)
-        q1, qd1, _ = flow(q, qd, tau - ca.DM(friction.G).T @ f, X, h)
-        qx, qdx, left, at_rest = event(q, qd, qdd, q1, qd1, h, direction, whole)
-        return [q + rest(qx - q, Y, direction == 0), rest(qdx, Y, at_rest), left, qdd]
+    inputs = plant_inputs(model, friction)
+    cut, whole = (round_function(model, friction, constants, flow, whole=k) for k in (0, 1))
 
     # a switch gives only what is used: in C, CasADi crashes on a result of one that nobody takes
     q, qd, *fixed, h = inputs
-    kept, results = one(0), [q, qd, h]
+    kept, results = list(cut(*inputs)[:4]), [q, qd, h]
     again = ca.Function.if_else("again", ca.Function("next", inputs, kept[:3]), ca.Function("idle", inputs, results))
-    final = ca.Function.if_else("final", ca.Function("last", inputs, one(1)[:2]), ca.Function("idle", inputs, results[:2]))
+    final = ca.Function.if_else("final", ca.Function("last", inputs, list(whole(*inputs)[:2])), ca.Function("idle", inputs, results[:2]))
     q, qd, h, qdd = ca.Function("first", inputs, kept)(*inputs)
     for _ in range(ROUNDS - 2):
         q, qd, h = again(h > 0, q, qd, *fixed, h)
     q, qd = final(h > 0, q, qd, *fixed, h)
     return ca.Function("rounds", inputs, [q, qd, qdd])
+
+
+def round_function(model: SymbolicModel, friction: DryFriction, constants: dict[str, float], flow: Any, *, whole: int) -> Any:
+    """The plant until the next slip stops, or the whole of h: q, qd, what is left of h, qdd, f, direction, Y, slips that stopped."""
+    inputs = plant_inputs(model, friction)
+    q, qd, tau, X, plus, minus, h = inputs
+    f, direction, qdd, Y = friction_function(model, friction, constants)(q, qd, tau, X, plus, minus)
+    q1, qd1, _ = flow(q, qd, tau - ca.DM(friction.G).T @ f, X, h)
+    qx, qdx, left, at_rest = event_function(friction)(q, qd, qdd, q1, qd1, h, direction, whole)
+    rest, held = rest_function(friction), direction == 0
+    results = [q + rest(qx - q, Y, held), rest(qdx, Y, at_rest), left, qdd, f, direction, Y, at_rest * (direction != 0)]
+    return ca.Function(f"round_{whole}", inputs, results)
+
+
+def plant_inputs(model: SymbolicModel, friction: DryFriction) -> list[MX]:
+    """q, qd, tau, Xs, plus, minus, h."""
+    n, m = friction.G.shape[1], len(friction.G)
+    names = {"q": n, "qd": n, "tau": n, "X": len(model.BASE_PARAMETERS), "plus": m, "minus": m, "h": 1}
+    return [ca.MX.sym(name, rows) for name, rows in names.items()]
 
 
 def _flow_inputs(model: SymbolicModel) -> tuple[list[MX], Any]:

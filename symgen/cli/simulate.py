@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from runtime.model import GeneratedModel
-    from runtime.studies.simulation import Simulation
+    from runtime.simulation_result import Simulation
     from runtime.study import Study
 
 RECORD = "simulated.csv"

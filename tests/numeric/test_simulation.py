@@ -16,7 +16,8 @@ from runtime.io.datasets import dataset_study
 from runtime.mapping import structure
 from runtime.reference import Reference, reference_of
 from runtime.signals import filtered_states
-from runtime.studies.simulation import SimulationError, Simulator, inertia_ratio, parameters_of, simulate
+from runtime.simulation_result import SimulationError
+from runtime.studies.simulation import Simulator, inertia_ratio, parameters_of, simulate
 from runtime.studies.simulation_friction import dry_friction, friction_function
 from runtime.studies.simulation_loop import plant_function
 from runtime.symbolic_model import load_symbolic
