@@ -1,9 +1,10 @@
 """The closed loop in which a record was made, run again with other parameters: what IV, DIDIM and CLOE compare the record with.
 
     loop = closed_loop(model, records, study, simulator)
+    seen = loop.measured()                Y = W X + rho, to which the loop stays attached
     runs = loop.run(X, g)                 one simulation per record, exact states, no noise, no steps
-    Z    = loop.instruments(runs)         F_p[W(q_s, ...)], q_s through the filters of the record                   IDIM-IV
-    Z    = loop.motion(runs)              F_p[W(q_s, qd_s, qdd_s)], exact states through the decimation alone       DIDIM
+    loop.instruments(runs, seen)          Z = F_p[W(q_s, ...)], q_s through the filters of the record                   IDIM-IV
+    loop.motion(runs, seen)               Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the decimation alone       DIDIM
 
 g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies all that stands between position error and torque: the bandwidth
 of the simulated loop stays that of the real one while X^k is far from the truth. Rows are chosen by the velocity of the reference, never by that
@@ -24,7 +25,7 @@ import numpy as np
 from runtime.controller_settings import Controller
 from runtime.errors import InputError, SettingsError
 from runtime.model import GeneratedModel
-from runtime.observation import Observation, decimated_torque, observation_from_states, stack
+from runtime.observation import LoopRows, Observation, decimated_torque, observation_from_states, stack
 from runtime.record import Record
 from runtime.reference import Reference, reference_of
 from runtime.rows import Selection, select_rows
@@ -84,25 +85,30 @@ class ClosedLoop:
         return [self.simulator.run(X, part.reference, g=g, start=part.record.q[0], ideal=True) for part in self.parts]
 
     def measured(self) -> Observation:
-        """Y = W X + rho of the measured positions on the rows of the loop."""
-        return self._observed([filtered_states(p.record.q, p.record.rate, p.selection.signals) for p in self.parts])
+        """Y = W X + rho of the measured positions on the rows of the loop, which it carries along."""
+        seen = self._observed([filtered_states(p.record.q, p.record.rate, p.selection.signals) for p in self.parts])
+        return replace(seen, closed_loop=LoopRows(self, np.arange(len(seen.Y))))
 
-    def instruments(self, runs: Sequence[Run]) -> Observation:
-        """Z of the simulated positions through the filters of the record, beside Y."""
-        return self._observed(
-            [filtered_states(run.q[: len(p.record)], p.record.rate, p.selection.signals) for run, p in zip(runs, self.parts, strict=True)]
-        )
+    def instruments(self, runs: Sequence[Run], seen: Observation) -> Observation:
+        """The rows and columns of `seen` with Z of the simulated positions, through the filters of the record, in place of W."""
+        pairs = zip(runs, self.parts, strict=True)
+        return self._like(seen, [filtered_states(run.q[: len(p.record)], p.record.rate, p.selection.signals) for run, p in pairs])
 
-    def motion(self, runs: Sequence[Run]) -> Observation:
-        """Z of the exact simulated states, beside Y."""
+    def motion(self, runs: Sequence[Run], seen: Observation) -> Observation:
+        """The rows and columns of `seen` with Z of the exact simulated states in place of W."""
         sizes = [len(part.record) for part in self.parts]
-        return self._observed([States(run.q[:N], run.qd[:N], run.qdd[:N]) for run, N in zip(runs, sizes, strict=True)])
+        return self._like(seen, [States(run.q[:N], run.qd[:N], run.qdd[:N]) for run, N in zip(runs, sizes, strict=True)])
 
     def inertia(self, X: Array) -> Array:
         """J_j, shape (n,): mean of A_jj over the references."""
         functions: Any = self.model
         q = np.concatenate([part.reference.q[:: max(1, len(part.reference) // 500)] for part in self.parts])
         return np.asarray(np.einsum("tjj->j", functions.inertia_matrix(q, X)) / len(q))
+
+    def _like(self, seen: Observation, states: Sequence[States]) -> Observation:
+        assert seen.closed_loop is not None
+        Z = self._observed(states).columns(seen.names).W
+        return replace(seen, W=np.asfortranarray(Z[seen.closed_loop.rows]))
 
     def _observed(self, states: Sequence[States]) -> Observation:
         seen = [
@@ -183,3 +189,15 @@ def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array |
         return keep
     free: Array = np.abs(record.tau) <= CLIPPED * bound
     return free if keep is None else free & (keep if keep.ndim == 2 else keep[:, None])
+
+
+def loop_of(observation: Observation, method: str) -> ClosedLoop:
+    """The loop of an observation; raises SettingsError where `method` was asked for and there is none."""
+    if observation.closed_loop is None:
+        raise SettingsError(
+            f"{method} simulates the closed loop of the record, and this study tells none; give a section `controller` with law, rate and reference "
+            "(symgen identify then makes it), or use ols, wls, irls or tls",
+            path=("estimate", "method"),
+        )
+    loop: ClosedLoop = observation.closed_loop.loop
+    return loop

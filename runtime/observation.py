@@ -31,6 +31,14 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
+class LoopRows:
+    """The closed loop that made the records (`runtime.closed_loop`), and which of its rows an observation holds, shape (r,)."""
+
+    loop: Any
+    rows: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Observation:
     """The decimated system Y = W X + rho with its row bookkeeping.
 
@@ -44,6 +52,7 @@ class Observation:
     settings : the signals and rows used, complete (to_mapping), with the factor that "auto" became.
     files : SHA-256 of the measured files, by name.
     errors : ndarray, shape (n, b, b), mean covariance of the errors of one row of W of joint j, where it is known (`runtime.perturbation`).
+    closed_loop : what can simulate the same rows with other parameters, where it is known.
     """
 
     W: Array
@@ -57,6 +66,7 @@ class Observation:
     settings: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
     errors: Array | None = None
+    closed_loop: LoopRows | None = None
 
     def __post_init__(self) -> None:
         r = sum(self.rows)
@@ -95,7 +105,9 @@ class Observation:
         if mask.shape != self.Y.shape or mask.dtype != np.bool_:
             raise InputError(f"mask {mask.dtype} {mask.shape}; expected bool {self.Y.shape}")
         rows = tuple(int(np.count_nonzero(mask[self.joint(j)])) for j in range(self.n))
-        return replace(self, W=np.asfortranarray(self.W[mask]), Y=self.Y[mask], t=self.t[mask], record=self.record[mask], rows=rows)
+        loop = None if self.closed_loop is None else replace(self.closed_loop, rows=self.closed_loop.rows[mask])
+        W = np.asfortranarray(self.W[mask])
+        return replace(self, W=W, Y=self.Y[mask], t=self.t[mask], record=self.record[mask], rows=rows, closed_loop=loop)
 
     def between(self, t0: float | None, t1: float | None) -> Observation:
         """The rows with t0 <= t <= t1, s; None leaves an end open."""

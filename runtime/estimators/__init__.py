@@ -4,6 +4,8 @@ ols   ordinary least squares               runtime/estimators/ols.py
 wls   least squares weighted by joint      runtime/estimators/wls.py
 irls  robust least squares, Huber or Tukey    runtime/estimators/irls.py
 tls   total least squares with exact columns    runtime/estimators/tls.py
+iv    instrumental variables of the simulated closed loop    runtime/estimators/iv.py
+didim   torques on the regressor of the simulated motion    runtime/estimators/didim.py
 feasible  least squares among physical robots, extra consistency    runtime/estimators/feasible.py
 """
 
@@ -15,7 +17,7 @@ from typing import Any, Protocol, TypeVar
 
 from runtime.errors import SettingsError
 from runtime.estimate import Estimate
-from runtime.estimators import feasible, irls, ols, tls, wls
+from runtime.estimators import didim, feasible, irls, iv, ols, tls, wls
 from runtime.estimators.linear import System, assemble
 from runtime.estimators.reduction import Reduction
 from runtime.model import GeneratedModel
@@ -70,8 +72,10 @@ def linear_estimate(
 
 METHODS: Mapping[str, Estimator] = {
     **dict.fromkeys(LINEAR, linear_estimate),
+    "didim": didim.didim,
     "feasible": feasible.feasible,
     "irls": irls.irls,
+    "iv": iv.iv,
     "tls": tls.tls,
 }
 """Every method, by the name that `estimate.method` of a study gives it."""

@@ -15,29 +15,34 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from runtime.closed_loop import ClosedLoop, Run
+from runtime.closed_loop import Run, loop_of
 from runtime.estimate import Estimate
 from runtime.estimators import wls
 from runtime.estimators.iteration import Array, Step, columns_of, iterate, options_of, told, trail_of
 from runtime.estimators.linear import System, assemble, standard_deviations
+from runtime.model import GeneratedModel
+from runtime.observation import Observation
 from runtime.study import EstimateSettings
 
 
 def didim(
-    loop: ClosedLoop, settings: EstimateSettings, *, model: Any | None = None, provenance: Mapping[str, Any] | None = None
+    observation: Observation,
+    settings: EstimateSettings,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """The Estimate; `details`: trail of the passes, contraction."""
-    options = options_of(settings)
-    observation = loop.measured()
-    names = columns_of(observation, settings)
+    """The Estimate; `details`: trail of the passes, contraction. SettingsError where no loop is attached to the observation."""
+    loop, options = loop_of(observation, "didim"), options_of(settings)
+    seen = columns_of(observation, settings)
 
     def update(runs: Sequence[Run], X: Array) -> Step:
-        system = _system(loop, runs, names)
+        system = wls.system(loop.motion(runs, seen), EstimateSettings(method="wls"))
         fit = system.solve()
         _, C = standard_deviations(system, fit)
         return Step(fit.X, C, fit.residual_norm, system)
 
-    fixed = iterate(loop, observation, names, options, update)
+    fixed = iterate(loop, seen, options, update)
     status, message = told(loop, fixed, options, "DIDIM")
     system: System = fixed.step.kept
     found = assemble(replace(system, settings=settings, iterations=len(fixed.trail)), system.solve(), model=model, provenance=provenance)
@@ -47,7 +52,3 @@ def didim(
         message=" ".join(part for part in (found.message, message) if part),
         details={"trail": trail_of(fixed), "contraction": fixed.contraction},
     )
-
-
-def _system(loop: ClosedLoop, runs: Sequence[Run], names: Sequence[str]) -> System:
-    return wls.system(loop.motion(runs).columns(names), EstimateSettings(method="wls"))

@@ -76,16 +76,16 @@ def options_of(settings: EstimateSettings) -> Options:
     return structure(Options, settings.options, ("estimate", "options"))
 
 
-def columns_of(observation: Observation, settings: EstimateSettings) -> tuple[str, ...]:
-    """Names of the columns that are estimated; the other parameters are zero."""
+def columns_of(observation: Observation, settings: EstimateSettings) -> Observation:
+    """The columns that are estimated; the other parameters are zero."""
     if settings.columns == "all":
-        return observation.names
+        return observation
     unknown = [name for name in settings.columns if name not in observation.names]
     if unknown:
         raise SettingsError(
             f"no parameter {', '.join(unknown)}; the model has {', '.join(observation.names)}", path=("estimate", "columns")
         )
-    return tuple(settings.columns)
+    return observation.columns(settings.columns)
 
 
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
@@ -94,10 +94,11 @@ def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
     return np.array([by_name.get(name, 0.0) for name in every])
 
 
-def initial(loop: ClosedLoop, observation: Observation, names: Sequence[str], which: str) -> Array:
+def initial(loop: ClosedLoop, seen: Observation, which: str) -> Array:
     """X of the columns by ordinary least squares, from the robot file, or of unit inertia."""
+    names = seen.names
     if which == "ols":
-        return ols.system(observation.columns(names), EstimateSettings()).solve().X
+        return ols.system(seen, EstimateSettings()).solve().X
     model: Any = loop.model
     standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)
     if which == "values":
@@ -119,13 +120,11 @@ def initial(loop: ClosedLoop, observation: Observation, names: Sequence[str], wh
     return np.array([X[name] for name in names])
 
 
-def iterate(
-    loop: ClosedLoop, observation: Observation, names: Sequence[str], options: Options, update: Callable[[Sequence[Run], Array], Step]
-) -> Fixed:
-    """The fixed point of X -> update(simulation with X, X)."""
-    every = observation.names
-    X = initial(loop, observation, names, options.start)
-    J = None if options.gains == "one" else loop.inertia(full(names, initial(loop, observation, names, options.gains), every))
+def iterate(loop: ClosedLoop, seen: Observation, options: Options, update: Callable[[Sequence[Run], Array], Step]) -> Fixed:
+    """The fixed point of X -> update(simulation with X, X), X of the columns of `seen`."""
+    names, every = seen.names, loop.model.BASE_PARAMETERS
+    X = initial(loop, seen, options.start)
+    J = None if options.gains == "one" else loop.inertia(full(names, initial(loop, seen, options.gains), every))
     trail: list[dict[str, Any]] = []
     step: Step | None = None
     changes: list[float] = []

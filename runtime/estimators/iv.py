@@ -24,13 +24,14 @@ from scipy.linalg import LinAlgError
 from scipy.sparse import csr_array
 from scipy.stats import chi2
 
-from runtime.closed_loop import ClosedLoop, Run
+from runtime.closed_loop import Run, loop_of
 from runtime.errors import InputError
 from runtime.estimate import Estimate
 from runtime.estimators import ols, wls
 from runtime.estimators.correlated import block_of_rows, default_block
 from runtime.estimators.iteration import Array, Step, columns_of, iterate, options_of, told, trail_of
 from runtime.estimators.linear import assemble, outcome
+from runtime.model import GeneratedModel
 from runtime.observation import Observation
 from runtime.study import EstimateSettings
 
@@ -40,25 +41,33 @@ CORRELATION = 0.1
 """Smallest correlation of the spaces of Z and W below which they are."""
 
 
-def iv(loop: ClosedLoop, settings: EstimateSettings, *, model: Any | None = None, provenance: Mapping[str, Any] | None = None) -> Estimate:
-    """The Estimate on the rows of the measured positions; a rank-deficient W is told as by least squares."""
-    options = options_of(settings)
-    every = loop.measured()
-    names = columns_of(every, settings)
-    seen = every.columns(names)
+def iv(
+    observation: Observation,
+    settings: EstimateSettings,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """The Estimate on the rows of the measured positions; a rank-deficient W is told as by least squares.
+
+    SettingsError where no loop is attached to the observation.
+    """
+    loop, options = loop_of(observation, "iv"), options_of(settings)
+    seen = columns_of(observation, settings)
+    names = seen.names
     base = ols.system(seen, EstimateSettings())
     first = base.solve()
     if first.rank < len(names):
         return assemble(replace(base, settings=settings), first, model=model, provenance=provenance)
 
     def update(runs: Sequence[Run], X: Array) -> Step:
-        Z = loop.instruments(runs).columns(names).W
+        Z = loop.instruments(runs, seen).W
         s = _scales(seen, X, base.raw)
         found = _solved(seen, Z, s)
         norm = float(np.linalg.norm((seen.Y - seen.W @ found[0]) / np.repeat(s, seen.rows)))
         return Step(found[0], found[1], norm, (Z, s, found[2]))
 
-    fixed = iterate(loop, every, names, options, update)
+    fixed = iterate(loop, seen, options, update)
     status, message = told(loop, fixed, options, "IV")
     X, C = fixed.step.X, fixed.step.covariance
     Z, s, A = fixed.step.kept
