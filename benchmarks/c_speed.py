@@ -4,7 +4,7 @@
 
 One process pinned to one core, CPU time, contenders in rotated order in every round, ratios per round as median [range]. All write into
 stores already in use. Before timing, every entry is compared with NumPy, in units of its column's maximum. Compile time is that of the
-whole C file (five functions, three vector widths), into an empty cache. Goals: C at most 1.4 times the fill; compiled in 2 s; 1e-12.
+whole C file (six functions, the vector width of this processor), into an empty cache. Goals: C at most 1.4 times the fill; compiled in 2 s; 1e-12.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from rounds import interleave, processor, ratio
 
 from runtime import GeneratedModel, load_model
 from runtime.studies.compile_cache import FallbackWarning, compiler
@@ -27,31 +28,7 @@ from runtime.studies.compiled import compiled_model
 from symgen.description import load_robot
 from symgen.emit import generate_files
 
-SPENT = 0.1  # s of CPU that one contender uses in a round
 Array = np.ndarray
-
-
-def cpu(action: Callable[[], object], repeats: int) -> float:
-    start = time.process_time()
-    for _ in range(repeats):
-        action()
-    return (time.process_time() - start) / repeats
-
-
-def interleave(contenders: dict[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """CPU seconds of every contender in every round, order rotated from round to round."""
-    repeats = {name: max(1, round(SPENT / max(cpu(action, 1), 1e-6))) for name, action in contenders.items()}
-    times: dict[str, list[float]] = {name: [] for name in contenders}
-    names = list(contenders)
-    for k in range(rounds):
-        for name in names[k % len(names) :] + names[: k % len(names)]:
-            times[name].append(cpu(contenders[name], repeats[name]))
-    return times
-
-
-def ratio(times: dict[str, list[float]], above: str, below: str) -> str:
-    per_round = [a / b for a, b in zip(times[above], times[below], strict=True)]
-    return f"{statistics.median(per_round):6.2f}  [{min(per_round):.2f}, {max(per_round):.2f}]"
 
 
 def deviation(found: Array, expected: Array) -> float:
@@ -96,11 +73,6 @@ def regressors(model: GeneratedModel, c: GeneratedModel, N: int, rounds: int) ->
         print(f"    {key:14} {1e9 * statistics.median(row) / N:8.1f} ns/sample")
     for above, below in (("NumPy", "C"), ("C", "fill"), ("C", "fill nonzero"), ("NumPy torques", "C torques")):
         print(f"    {above + ' / ' + below:26} {ratio(times, above, below)}")
-
-
-def processor() -> str:
-    text = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
-    return next((line.split(":")[1].strip() for line in text.splitlines() if line.startswith("model name")), platform.processor())
 
 
 def main() -> None:

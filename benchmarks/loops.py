@@ -26,7 +26,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 from generation import generation, import_sympy
-from regressor_speed import SAMPLES, Array, States, interleave, load_module, processor, ratio
+from regressor_speed import SAMPLES, Array, States, load_module
+from rounds import interleave, processor, ratio
 
 from symgen.derive.loops import close
 from symgen.description import load_robot

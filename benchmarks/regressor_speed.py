@@ -23,7 +23,6 @@ import os
 import platform
 import statistics
 import sys
-import time
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -37,6 +36,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 import pinocchio as pin
+from rounds import SPENT, interleave, processor, ratio
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
@@ -48,7 +48,6 @@ from symgen.description.yaml import load_robot
 from symgen.emit import generate_module
 
 SAMPLES = 7103  # not a multiple of 8
-SPENT = 0.1  # s of CPU that one contender uses in a round
 MEMORY = 64e6  # bytes beside W
 TOLERANCE = 1e-10
 Array = np.ndarray[Any, Any]
@@ -93,29 +92,6 @@ def compare(module: ModuleType, oracle: PinocchioModel, D: Array, W: Array) -> f
         ours, theirs = D @ K[:, names.index(f"{p}{j}")], W[:, :, column]
         worst = max(worst, float(np.abs(ours - theirs).max() / max(np.abs(theirs).max(), 1e-3 * np.abs(W).max())))
     return worst
-
-
-def cpu(action: Callable[[], object], repeats: int) -> float:
-    start = time.process_time()
-    for _ in range(repeats):
-        action()
-    return (time.process_time() - start) / repeats
-
-
-def interleave(contenders: dict[str, Callable[[], object]], rounds: int, spent: float = SPENT) -> dict[str, list[float]]:
-    """CPU seconds of every contender in every round, order rotated from round to round."""
-    repeats = {name: max(1, round(spent / max(cpu(action, 1), 1e-6))) for name, action in contenders.items()}
-    times: dict[str, list[float]] = {name: [] for name in contenders}
-    names = list(contenders)
-    for k in range(rounds):
-        for name in names[k % len(names) :] + names[: k % len(names)]:
-            times[name].append(cpu(contenders[name], repeats[name]))
-    return times
-
-
-def ratio(times: dict[str, list[float]], above: str, below: str) -> str:
-    per_round = [a / b for a, b in zip(times[above], times[below], strict=True)]
-    return f"{statistics.median(per_round):6.2f}  [{min(per_round):.2f}, {max(per_round):.2f}]"
 
 
 def fill(store: Array, value: float) -> None:
@@ -184,11 +160,6 @@ def large(name: str, module: ModuleType, N: int, rounds: int) -> None:
     for key, row in per_sample.items():
         print(f"  {key:10} {1e9 * statistics.median(row):9.1f} ns/sample")
     print(f"  {'large / small':22} {ratio(per_sample, 'large', 'small')}")
-
-
-def processor() -> str:
-    text = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
-    return next((line.split(":")[1].strip() for line in text.splitlines() if line.startswith("model name")), platform.processor())
 
 
 def main() -> None:
