@@ -85,7 +85,8 @@ class Simulator:
         ideal : no noise, no steps of encoder and converter.   disturbance : torques on the arm that are not recorded, (N, n).
         feedforward : torques added to the command, (N, n), in place of those of the settings.   seed : of the noise; default: that of the settings.
         """
-        plan = self._plan(X, reference, g, start, disturbance, feedforward, None if ideal else seed or self.controller.seed)
+        seed = self.controller.seed if seed is None else seed
+        plan = self._plan(X, reference, g, start, disturbance, feedforward, None if ideal else seed)
         states, out = self._iterated(plan)
         return self._result(plan, states, out, reference, name)
 
