@@ -10,7 +10,8 @@
 
 Signals are rows of samples, U[s*stride + t]; entry e of joint j is sign[e]*U[signal[e]]. All memory comes from the caller and nothing is kept
 between calls, so any number of threads may work, each on its own arrays. Functions return 0, 1 for arguments that cannot be, 2 where the
-signals of the robot refuse theirs. Compile with -ffp-contract=fast, never with -ffast-math.
+signals of the robot refuse theirs. Compile with -ffp-contract=fast, never with -ffast-math; -DPORTABLE leaves out what is for
+one processor, -DSCALAR vector types too.
 */
 
 #ifndef KERNELS
@@ -29,14 +30,16 @@ signals of the robot refuse theirs. Compile with -ffp-contract=fast, never with 
 
 /* The sums of products are written once, for vectors of WIDTH numbers, and read in once for each width: see KERNELS. The filters of the states
 are plain loops and PLAIN: no version of them has an instruction that fuses product and sum, so they agree with scipy in every bit. */
-#ifdef __GNUC__
+#if defined(__GNUC__) && !defined(SCALAR)
 #define INLINE static inline __attribute__((always_inline))
 #else
 #define INLINE static inline
 #endif
-#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__) && !defined(PORTABLE)
-#define PLAIN __attribute__((target_clones("avx2", "default")))
+#if defined(__GNUC__) && defined(__x86_64__) && !defined(PORTABLE) && !defined(SCALAR)
 #define WIDER
+#endif
+#if defined(WIDER) && !defined(__clang__) && defined(__GLIBC__)
+#define PLAIN __attribute__((target_clones("avx2", "default")))
 #else
 #define PLAIN
 #endif
@@ -133,7 +136,7 @@ struct kernels {
 #define NAME(x) x##_plain
 #define TARGET
 #define TOGETHER 2
-#ifdef __GNUC__
+#if defined(__GNUC__) && !defined(SCALAR)
 #define WIDTH 2
 #else
 #define WIDTH 1
