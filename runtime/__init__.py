@@ -5,16 +5,24 @@
     record = read_records(study.record, model)[0]
     observation = observe(model, record, study)     # Y = W X + rho, eqs. (6) and (14)
 
-Estimators take an Observation and return an Estimate (`runtime.estimators`).
+    streams = open_streams(study.record, model, block=65536)
+    reduction = reduce_records(model, streams, study)       # the same for records larger than memory: factors instead of rows
+
+Estimators take an Observation or a Reduction and return an Estimate (`runtime.estimators`). On states without filters,
+`normal_equations` and `triangular_factor` solve by blocks, without W.
 """
 
 from runtime.drives import Drives
 from runtime.errors import DataUnavailableError, InputError, ModelError, SettingsError
+from runtime.estimators.reduction import Reduction
 from runtime.io.records import read_record, read_records
+from runtime.io.streams import open_streams
 from runtime.model import GeneratedModel, load_model
 from runtime.observation import Observation, observe, stack
 from runtime.record import Record
+from runtime.reductions import normal_equations, triangular_factor
 from runtime.signals import States, filtered_states
+from runtime.streaming import reduce_records
 from runtime.study import Study, study_from_mapping, to_mapping
 
 __all__ = [
@@ -25,15 +33,20 @@ __all__ = [
     "ModelError",
     "Observation",
     "Record",
+    "Reduction",
     "SettingsError",
     "States",
     "Study",
     "filtered_states",
     "load_model",
+    "normal_equations",
     "observe",
+    "open_streams",
     "read_record",
     "read_records",
+    "reduce_records",
     "stack",
     "study_from_mapping",
     "to_mapping",
+    "triangular_factor",
 ]

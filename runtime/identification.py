@@ -25,7 +25,7 @@ from runtime.observation import Observation, observe, stack
 from runtime.perturbation import with_errors
 from runtime.record import Record
 from runtime.record_stream import ChangedStream, Stream
-from runtime.streaming import halves, reduce
+from runtime.streaming import halves, reduce_records
 from runtime.study import Study
 from runtime.validation import (
     Comparison,
@@ -169,11 +169,11 @@ def identification(
 def observed(
     model: GeneratedModel, records: Sequence[Record | Stream], study: Study, *, windows: Sequence[Window] | None = None
 ) -> Observation | Reduction:
-    """The rows of the records, or what is left of them where they are read by blocks; windows : as in `streaming.reduce`."""
+    """The rows of the records, or what is left of them where they are read by blocks; windows : as in `streaming.reduce_records`."""
     in_memory = [record for record in records if isinstance(record, Record)]
     if in_memory:
         return stack([rows_of(model, record, study) for record in in_memory])
-    return reduce(model, [record for record in records if not isinstance(record, Record)], study, windows=windows)
+    return reduce_records(model, [record for record in records if not isinstance(record, Record)], study, windows=windows)
 
 
 def rows_of(model: GeneratedModel, record: Record, study: Study) -> Observation:

@@ -1,6 +1,6 @@
 """From a record that does not fit into memory to what its rows leave behind: `observe` and `stack` by blocks, without W.
 
-    reduction = reduce(model, streams, study)        a Reduction: estimators, essential parameters and validation take it like an Observation
+    reduction = reduce_records(model, streams, study)        a Reduction: estimators, essential parameters and validation take it like an Observation
 
 Each block goes through the drives, the filters of `runtime.stages`, the distinct signals of the regressor and the decimation, and its rows into the
 triangular factors of their segment. Nothing of the length of the record is kept, and the result is that of the whole record: same filters,
@@ -53,7 +53,7 @@ class Layout:
     dropped: Mapping[str, tuple[int, ...]]
 
 
-def reduce(
+def reduce_records(
     model: GeneratedModel,
     streams: Sequence[Stream],
     study: Study,

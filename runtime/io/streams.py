@@ -1,7 +1,7 @@
 """From the files of a measurement to a record that is read by blocks, joint side, SI: `runtime.io.records` for files larger than memory.
 
     stream = open_streams(study.record, model, block=65536)[0]
-    reduction = runtime.streaming.reduce(model, [stream], study)
+    reduction = runtime.streaming.reduce_records(model, [stream], study)
 
 The same settings, checks and errors; hashes and the clock are read when the stream is opened, finite numbers are required as blocks come by.
 """

@@ -16,7 +16,7 @@ from runtime.io.datasets import dataset_study
 from runtime.io.streams import are_large, open_stream
 from runtime.observation import stack
 from runtime.record_stream import RecordStream
-from runtime.streaming import halves, reduce
+from runtime.streaming import halves, reduce_records
 from runtime.study import EstimateSettings, RecordSettings
 from runtime.validation import cross_validation, split_validation, weak_directions
 
@@ -192,7 +192,7 @@ def same(found, expected):
 def test_identification_of_the_tx40_by_blocks(tx40, block):
     model, study, record = tx40
     whole = observe(model, record, study)
-    reduction = reduce(model, [RecordStream(record, block)], study)
+    reduction = reduce_records(model, [RecordStream(record, block)], study)
     assert (reduction.rows, reduction.dropped, reduction.files) == (whole.rows, whole.dropped, whole.files)
     expected, found = (essential(x, study.essential, study.estimate, model=model) for x in (whole, reduction))
     same(found.all_parameters, expected.all_parameters)
@@ -222,7 +222,7 @@ def test_identification_of_the_tx40_by_blocks(tx40, block):
 def test_settings_by_blocks(tx40, changed, estimator):
     model, study, record = tx40
     study = study_from_mapping({"estimate": estimator, **changed})
-    whole, reduction = observe(model, record, study), reduce(model, [RecordStream(record, 4001)], study)
+    whole, reduction = observe(model, record, study), reduce_records(model, [RecordStream(record, 4001)], study)
     assert (reduction.rows, reduction.dropped) == (whole.rows, whole.dropped)
     same(*(estimate(x, study.estimate, model=model) for x in (reduction, whole)))
 
@@ -232,13 +232,13 @@ def test_several_records_by_blocks(tx40):
     study = replace(study, rows=replace(study.rows, window=(None, None), low_speed=0.05))
     parts = [replace(record, t=record.t[s], q=record.q[s], tau=record.tau[s]) for s in (slice(0, 21000), slice(15000, 40000))]
     whole = stack([observe(model, part, study) for part in parts])
-    reduction = reduce(model, [RecordStream(part, 6000) for part in parts], study)
+    reduction = reduce_records(model, [RecordStream(part, 6000) for part in parts], study)
     assert (reduction.rows, reduction.dropped, reduction.files) == (whole.rows, whole.dropped, whole.files)
     same(*(estimate(x, study.estimate, model=model) for x in (reduction, whole)))
     assert reduction.windows == halves(float(whole.t.min()), float(whole.t.max())) or study.validate.split
     one, other = (
         cross_validation(x, {"first": y}, study.estimate).predictions[1]
-        for x, y in ((whole, observe(model, parts[0], study)), (reduction, reduce(model, [RecordStream(parts[0], 3000)], study)))
+        for x, y in ((whole, observe(model, parts[0], study)), (reduction, reduce_records(model, [RecordStream(parts[0], 3000)], study)))
     )
     np.testing.assert_allclose((one.relative_error, *one.per_joint), (other.relative_error, *other.per_joint), rtol=1e-8)
 
@@ -246,14 +246,14 @@ def test_several_records_by_blocks(tx40):
 def test_what_needs_the_rows_is_refused(tx40):
     model, study, record = tx40
     short = replace(study, rows=replace(study.rows, window=(1.0, 2.0)), validate=replace(study.validate, split=((1.0, 1.5), (1.5, 2.0))))
-    reduction = reduce(model, [RecordStream(record, 5000)], short)
+    reduction = reduce_records(model, [RecordStream(record, 5000)], short)
     with pytest.raises(SettingsError, match="stream: off"):
         estimate(reduction, EstimateSettings("wls", "covariance"))
     with pytest.raises(InputError, match="cut by the windows"):
         reduction.between(1.0, 1.7)
     with pytest.raises(InputError, match=r"no sample in rows\.window"):
-        reduce(model, [RecordStream(record, 5000)], replace(study, rows=replace(study.rows, window=(20.0, 30.0))))
+        reduce_records(model, [RecordStream(record, 5000)], replace(study, rows=replace(study.rows, window=(20.0, 30.0))))
     with pytest.raises(InputError, match=r"of which rows\.trim leaves out 200"):
-        reduce(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, trim=100)))
+        reduce_records(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, trim=100)))
     with pytest.raises(InputError, match="no row is left"):
-        reduce(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, low_speed=100.0)))
+        reduce_records(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, low_speed=100.0)))
