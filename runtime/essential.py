@@ -40,7 +40,7 @@ class Essential:
     """The essential parameters and how they were found.
 
     names : kept, in column order.   estimate : fit with these alone.   all_parameters : the first fit.
-    trail : one Removal per step, the last one being the first refused (or the last parameter).
+    trail : one Removal per step, the last one being the first refused (or the last parameter); further : the next steps, up to the largest threshold.
     counts : number of parameters kept, by threshold.
     """
 
@@ -50,6 +50,7 @@ class Essential:
     trail: tuple[Removal, ...]
     threshold: float
     counts: Mapping[float, int]
+    further: tuple[Removal, ...] = ()
 
     def __str__(self) -> str:
         return self.to_table()
@@ -80,6 +81,7 @@ class Essential:
             "names": self.names,
             "threshold": self.threshold,
             "trail": self.trail,
+            "further": self.further,
             "counts": {f"{k:g}": v for k, v in self.counts.items()},
         }
 
@@ -103,7 +105,8 @@ def essential(
     steps = _trail(system, wanted[-1])
     counts = {threshold: len(system.names) - _accepted(steps, threshold) for threshold in wanted}
     accepted = _accepted(steps, settings.threshold)
-    trail = tuple(Removal(name, relative, ratio, k < accepted) for k, (name, relative, ratio) in enumerate(steps[: accepted + 1]))
+    removals = tuple(Removal(name, relative, ratio, k < accepted) for k, (name, relative, ratio) in enumerate(steps))
+    trail, further = removals[: accepted + 1], removals[accepted + 1 :]
     gone = {step.name for step in trail if step.removed}
     kept = tuple(name for name in system.names if name not in gone)
     reduced = system.select(kept)
@@ -114,6 +117,7 @@ def essential(
         trail=trail,
         threshold=settings.threshold,
         counts=counts,
+        further=further,
     )
 
 

@@ -27,6 +27,7 @@ from runtime.record import Record
 from runtime.record_stream import ChangedStream, Stream
 from runtime.streaming import halves, reduce_records
 from runtime.study import Study
+from runtime.trust import Trust, trust
 from runtime.validation import (
     Comparison,
     CrossValidation,
@@ -48,6 +49,7 @@ class Identification:
 
     found : all parameters, the essential ones and the trail between them; of the linear companion of a method that is not linear.
     chosen : all parameters by the method of the study.   comparison : torques by the essential parameters, or by `chosen` of such a method.
+    trust : deviations without independence, whiteness of the residuals, F-tests, sets by threshold.
     validation : one part of the data predicts the others: halves first, then further records.   weak : parameters that trade.
     coupling : fit of all parameters with the off-diagonal part of the drives in both directions, one, or none; empty where there is none.
     """
@@ -62,6 +64,7 @@ class Identification:
     validation: tuple[CrossValidation, ...]
     weak: WeakDirections
     coupling: Mapping[Coupling, Estimate]
+    trust: Trust
 
     @property
     def name(self) -> str:
@@ -121,7 +124,13 @@ class Identification:
                 "per_joint": fit.per_joint,
             },
             "validation": [part.summary() for part in self.validation],
-            "weak_directions": {"threshold": self.weak.threshold, "pairs": self.weak.pairs, "groups": self.weak.groups},
+            "weak_directions": {
+                "threshold": self.weak.threshold,
+                "pairs": self.weak.pairs,
+                "groups": self.weak.groups,
+                "directions": self.weak.directions,
+            },
+            "trust": self.trust.summary(),
             "coupling": {key: {"relative_error": e.relative_error, "per_joint": e.per_joint} for key, e in self.coupling.items()},
             "verdict": self.verdict,
         }
@@ -150,6 +159,8 @@ def identification(
         seen = {record.name: observed(model, [record], study, windows=()) for record in further}
         name = ", ".join(record.name for record in records)
         validation.append(cross_validation(observation, seen, study.estimate, essential=found.names, name=name, model=model))
+    shown = observation if isinstance(observation, Observation) else observation.shown
+    comparison = direct_comparison(shown, found.estimate if linear else chosen)
     return Identification(
         model=model,
         study=study,
@@ -157,12 +168,11 @@ def identification(
         observation=observation,
         found=found,
         chosen=chosen,
-        comparison=direct_comparison(
-            observation if isinstance(observation, Observation) else observation.shown, found.estimate if linear else chosen
-        ),
+        comparison=comparison,
         validation=tuple(validation),
         weak=weak_directions(observation, study.estimate),
         coupling=coupling_fits(model, study, records),
+        trust=trust(observation, study.estimate, found, comparison),
     )
 
 

@@ -12,6 +12,7 @@ from runtime.estimate import Estimate
 from runtime.identification import Identification
 from runtime.report import plots
 from runtime.report.html import Image, Section, Table
+from runtime.report.trust import trust_section
 
 MEANING = {
     "both": "position and torque (used where the settings say so)",
@@ -35,7 +36,12 @@ def torque_unit(found: Identification) -> str:
 def identification_sections(found: Identification) -> list[Section]:
     """Torques, errors per joint, parameters, trail, validation, weak directions, coupling."""
     sections = [torque_section(found), joint_section(found), parameter_section(found), trail_section(found), validation_section(found)]
-    return [*sections, weak_section(found), *([coupling_section(found)] if found.coupling else [])]
+    return [
+        *sections,
+        weak_section(found),
+        trust_section(found.trust, torque_unit(found)),
+        *([coupling_section(found)] if found.coupling else []),
+    ]
 
 
 def torque_section(found: Identification) -> Section:

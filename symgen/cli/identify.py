@@ -80,9 +80,20 @@ def console_text(found: Identification, more: Beside | None = None) -> str:
     fit = found.carried if found.every.status != "rank-deficient" else found.every
     groups = "; ".join(", ".join(group) for group in found.weak.groups) or "none"
     parts = [fit.to_table(), found.found.to_table(), *(part.to_table() for part in found.validation)]
-    parts += [f"parameters that trade against each other (|correlation| above {found.weak.threshold:g}): {groups}", coupling]
+    parts += [
+        f"parameters that trade against each other (|correlation| above {found.weak.threshold:g}): {groups}",
+        weakest_text(found),
+        found.trust.to_text(),
+        coupling,
+    ]
     parts += ["" if more is None else more.text(), found.verdict]
     return "\n\n".join(part for part in parts if part)
+
+
+def weakest_text(found: Identification) -> str:
+    """Directions that W sees least, by name."""
+    lines = [f"{d.ratio:.1e}  " + " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items()) for d in found.weak.directions]
+    return "\n".join(["directions that W sees least (singular value over the largest, unit columns)", *lines])
 
 
 def estimate_json(found: Identification, more: Beside | None = None) -> str:
