@@ -29,7 +29,7 @@ from runtime.observation import LoopRows, Observation, decimated_torque, observa
 from runtime.record import Record
 from runtime.reference import Reference, reference_of
 from runtime.rows import Selection, select_rows
-from runtime.signals import States, filtered_states
+from runtime.signals import States, decimated, filtered_states
 from runtime.study import Study
 
 Array = np.ndarray
@@ -58,6 +58,9 @@ class Simulator(Protocol):
 
     def run(self, X: Array, reference: Reference, *, g: Array | float, start: Array, ideal: bool) -> Run:
         """One run; raises InputError where it cannot be made."""
+
+    def sensitivity(self, X: Array, reference: Reference, *, start: Array) -> tuple[Run, Any]:
+        """An ideal run, and its derivatives by X, arrays q and tau of shape (N, n, b)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +101,24 @@ class ClosedLoop:
         """The rows and columns of `seen` with Z of the exact simulated states in place of W."""
         sizes = [len(part.record) for part in self.parts]
         return self._like(seen, [States(run.q[:N], run.qd[:N], run.qdd[:N]) for run, N in zip(runs, sizes, strict=True)])
+
+    def sensitivity(self, X: Array) -> list[tuple[Run, Any]]:
+        """One simulation per record, with its derivatives by X."""
+        return [self.simulator.sensitivity(X, part.reference, start=part.record.q[0]) for part in self.parts]
+
+    def outputs(self, signals: Sequence[Array], seen: Observation) -> Array:
+        """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of `seen`: shape (r,) or (r, c)."""
+        assert seen.closed_loop is not None
+        by_joint: list[Array] = []
+        kept = [self._decimated(x, part) for x, part in zip(signals, self.parts, strict=True)]
+        for j in range(len(self.model.JOINTS)):
+            by_joint += [x[j][..., part.selection.mask[j]].T for x, part in zip(kept, self.parts, strict=True)]
+        return np.asarray(np.concatenate(by_joint)[seen.closed_loop.rows])
+
+    def _decimated(self, x: Array, part: LoopPart) -> Array:
+        """(N, n, ...) to (n, ..., K)."""
+        chosen = np.moveaxis(x[: len(part.record)][part.selection.samples], 0, -1)
+        return decimated(np.ascontiguousarray(chosen), part.selection.factor, part.selection.signals.decimate)
 
     def inertia(self, X: Array) -> Array:
         """J_j, shape (n,): mean of A_jj over the references."""

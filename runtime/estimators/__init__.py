@@ -5,6 +5,7 @@ wls   least squares weighted by joint      runtime/estimators/wls.py
 irls  robust least squares, Huber or Tukey    runtime/estimators/irls.py
 tls   total least squares with exact columns    runtime/estimators/tls.py
 iv    instrumental variables of the simulated closed loop    runtime/estimators/iv.py
+cloe    output error of the closed loop, position or torque    runtime/estimators/cloe.py
 didim   torques on the regressor of the simulated motion    runtime/estimators/didim.py
 feasible  least squares among physical robots, extra consistency    runtime/estimators/feasible.py
 """
@@ -17,7 +18,7 @@ from typing import Any, Protocol, TypeVar
 
 from runtime.errors import SettingsError
 from runtime.estimate import Estimate
-from runtime.estimators import didim, feasible, irls, iv, ols, tls, wls
+from runtime.estimators import cloe, didim, feasible, irls, iv, ols, tls, wls
 from runtime.estimators.linear import System, assemble
 from runtime.estimators.reduction import Reduction
 from runtime.model import GeneratedModel
@@ -72,6 +73,7 @@ def linear_estimate(
 
 METHODS: Mapping[str, Estimator] = {
     **dict.fromkeys(LINEAR, linear_estimate),
+    "cloe": cloe.cloe,
     "didim": didim.didim,
     "feasible": feasible.feasible,
     "irls": irls.irls,

@@ -1,0 +1,184 @@
+"""CLOE and CLIE: output error of the closed loop, in position or in torque.
+
+    X = argmin sum_j ||y_j - y_s,j(X)||^2 / s_j^2,    y decimated position (CLOE) or torque (CLIE), y_s that of the simulation with X
+
+Gauss-Newton with Levenberg's damping on D^-1 X, D = max(|X^0|, sigma of least squares); J = dy_s/dX from the tangent system of the loop, g = 1.
+s_j is the deviation of the residual: found at the start, found again at the first minimum, from where the search goes on once more.
+C = s^2 (J'VJ)^-1. A loop that holds its position well makes J small: slow, dependent on its start, and the first to fail where the simulation
+does not know what the encoder did to the loop.
+
+Reference: Landau, Anderson and De Bruyne (2001) for output error in closed loop; Jubien, Gautier and Janot (2014) against DIDIM.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from runtime.closed_loop import ClosedLoop, loop_of
+from runtime.errors import InputError, SettingsError
+from runtime.estimate import Estimate
+from runtime.estimators import iv, ols
+from runtime.estimators.correlated import block_covariance, block_of_rows, default_block
+from runtime.estimators.iteration import Array, columns_of, full, initial
+from runtime.estimators.linear import assemble, outcome, standard_deviations
+from runtime.mapping import structure
+from runtime.model import GeneratedModel
+from runtime.observation import Observation
+from runtime.study import EstimateSettings
+
+DAMPING = 1e-3  # of the diagonal of the scaled J'J, at the start
+RISE, FALL = 5.0, 0.3
+
+
+@dataclass(frozen=True)
+class Options:
+    """estimate.options of cloe. output : "position", or "torque" (CLIE).   start : "iv", "ols" or "values".   passes : of each of two searches.
+
+    step, decrease : stop: largest |dX/D|, or relative decrease of the criterion.   reference : as for iv and didim.
+    """
+
+    output: Literal["position", "torque"] = "position"
+    start: Literal["iv", "ols", "values"] = "iv"
+    passes: int = 30
+    step: float = 1e-4
+    decrease: float = 1e-6
+    reference: Literal["known", "measured"] = "known"
+
+    def __post_init__(self) -> None:
+        for name in ("passes", "step", "decrease"):
+            if not getattr(self, name) > 0:
+                raise SettingsError(f"{getattr(self, name)!r}; expected a positive number", path=(name,))
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """X of the columns with the residual e (r,), and J (r, c) where it was asked for."""
+
+    X: Array
+    e: Array
+    J: Array | None = None
+
+    def criterion(self, weights: Array) -> float:
+        """||V^1/2 e||^2."""
+        return float(np.sum((weights * self.e) ** 2))
+
+
+def cloe(
+    observation: Observation,
+    settings: EstimateSettings,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """The Estimate; its residual norms and relative errors are those of Y - W X, `details` holds those of the output.
+
+    SettingsError where no loop is attached to the observation.
+    """
+    loop, options = loop_of(observation, "cloe"), structure(Options, settings.options, ("estimate", "options"))
+    seen = columns_of(observation, settings)
+    base = ols.system(seen, EstimateSettings())
+    first = base.solve()
+    if first.rank < len(seen.names):
+        return assemble(replace(base, settings=settings), first, model=model, provenance=provenance)
+    X = _start(loop, seen, options)
+    D = np.maximum(np.abs(X), np.sqrt(np.diag(standard_deviations(base, first)[1])))
+    y = _measured(loop, seen, options.output)
+    trail: list[dict[str, Any]] = []
+    point = _at(loop, seen, X, y, options.output)
+    converged = True
+    for _ in range(2):
+        weights = 1 / np.repeat(_deviations(point.e, seen), seen.rows)
+        point, converged = _searched(loop, seen, point, y, D, weights, options, trail)
+    point = _at(loop, seen, point.X, y, options.output, slope=True)
+    assert point.J is not None
+    weights = 1 / np.repeat(_deviations(point.e, seen), seen.rows)
+    T = np.linalg.inv(np.linalg.qr(point.J * weights[:, None] * D, mode="r")) * D[:, None]
+    r, c = point.J.shape
+    C = T @ T.T * point.criterion(weights) / max(r - c, 1)
+    C_b = block_covariance(point.J, point.e * weights**2, block_of_rows(seen, default_block(seen)), T)
+    found = assemble(replace(base, settings=settings, iterations=len(trail)), replace(first, X=point.X), model=model, provenance=provenance)
+    status, message = outcome(base, first)
+    parts = [message, loop.assumption]
+    if not converged:
+        status = "not-converged" if status == "ok" else status
+        parts.append(
+            f"The search has not converged after {len(trail)} steps. Output error depends on its start: start from iv, raise passes, or take didim."
+        )
+    return replace(
+        found,
+        covariance=C,
+        sigma=np.sqrt(np.diag(C)),
+        sigma_corrected=np.sqrt(np.diag(C_b)),
+        status=status,
+        message=" ".join(part for part in parts if part),
+        details={"output": options.output, "output_error": _relative(point.e, y, seen), "trail": trail},
+    )
+
+
+def _start(loop: ClosedLoop, seen: Observation, options: Options) -> Array:
+    if options.start != "iv":
+        return initial(loop, seen, options.start)
+    return iv.iv(seen, EstimateSettings(method="iv"), model=loop.model).X
+
+
+def _measured(loop: ClosedLoop, seen: Observation, output: str) -> Array:
+    """y, shape (r,)."""
+    return loop.outputs([part.record.q for part in loop.parts], seen) if output == "position" else seen.Y
+
+
+def _at(loop: ClosedLoop, seen: Observation, X: Array, y: Array, output: str, *, slope: bool = False) -> Point:
+    """The residual at X, and its slope."""
+    every = full(seen.names, X, loop.model.BASE_PARAMETERS)
+    label = "q" if output == "position" else "tau"
+    if not slope:
+        return Point(X, y - loop.outputs([getattr(run, label) for run in loop.run(every)], seen))
+    runs = loop.sensitivity(every)
+    numbers = [loop.model.BASE_PARAMETERS.index(name) for name in seen.names]
+    e = y - loop.outputs([getattr(run, label) for run, _ in runs], seen)
+    return Point(X, e, loop.outputs([getattr(tangent, label)[:, :, numbers] for _, tangent in runs], seen))
+
+
+def _searched(
+    loop: ClosedLoop, seen: Observation, point: Point, y: Array, D: Array, weights: Array, options: Options, trail: list[dict[str, Any]]
+) -> tuple[Point, bool]:
+    """Levenberg's steps down to a minimum of the weighted criterion."""
+    damping = DAMPING
+    for _ in range(options.passes):
+        if point.J is None:
+            point = _at(loop, seen, point.X, y, options.output, slope=True)
+        assert point.J is not None
+        A = point.J * weights[:, None] * D
+        before = point.criterion(weights)
+        size = np.sqrt(np.mean(np.sum(A**2, axis=0)))
+        damped = np.vstack([A, np.sqrt(damping) * size * np.eye(A.shape[1])])
+        d = np.linalg.lstsq(damped, np.concatenate([point.e * weights, np.zeros(A.shape[1])]), rcond=None)[0]
+        try:
+            tried = _at(loop, seen, point.X + D * d, y, options.output)
+            after = tried.criterion(weights)
+        except InputError:  # no loop with these parameters: a smaller step
+            after = np.inf
+        trail.append({"X": (point.X + D * d).tolist(), "criterion": after, "damping": damping})
+        if after < before:
+            point, damping = tried, damping * FALL
+            if before - after <= options.decrease * before:
+                return point, True
+        else:
+            damping *= RISE
+        if float(np.max(np.abs(d))) < options.step:
+            return point, True
+    return point, False
+
+
+def _deviations(e: Array, seen: Observation) -> Array:
+    """Root mean square of the residual of each joint, shape (n,), never zero."""
+    s = np.array([np.sqrt(np.mean(e[seen.joint(j)] ** 2)) if seen.rows[j] else 0.0 for j in range(seen.n)])
+    return np.asarray(np.maximum(s, 1e-9 * max(float(s.max()), 1e-12)))
+
+
+def _relative(e: Array, y: Array, seen: Observation) -> list[float]:
+    """100 ||y - y_s||/||y|| by joint."""
+    return [100 * float(np.linalg.norm(e[seen.joint(j)]) / np.linalg.norm(y[seen.joint(j)])) for j in range(seen.n) if seen.rows[j]]
