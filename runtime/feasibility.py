@@ -9,18 +9,19 @@ Without limits on masses chi is not unique: different chi of one X give the same
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.physical import INERTIAL, PhysicalModel
-from runtime.studies.consistency import Distance, Reference, Rows, closest, margin, solutions
+from runtime.studies.consistency import Distance, Found, Reference, Rows, closest, margin, solutions
 
 Array = np.ndarray
 Interval = tuple[float | None, float | None]
 
+LEAST = 1e-6  # smallest eigenvalue, SI, that standard parameters keep where there is room
 ROUNDING = 1e-9  # t* above -ROUNDING is zero to the accuracy of the solver
 TYPICAL = {"X": 0.1, "Y": 0.1, "Z": 0.1, "MX": 0.3, "MY": 0.3, "MZ": 0.3, "M": 3.0}  # kg m^2, kg m, kg; scales of the unknowns only
 
@@ -77,7 +78,7 @@ def feasibility(physical: PhysicalModel, names: Sequence[str], X: Array, limits:
     rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, scales(physical))
     first = margin(physical.conditions, rows, space)
     if not first.solved:
-        raise InputError(unsolved(first.status, rows))
+        raise InputError(unsolved(first.status, rows, lambda other: margin(physical.conditions, other, space)))
     blocking, conditions, found = [], list(physical.conditions), first
     while found.solved and found.value < -ROUNDING and conditions:
         worst = max(found.duals, key=lambda name: found.duals[name])
@@ -103,7 +104,7 @@ def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, st
     scale = scales(physical)
     space, rows = solutions(physical.rows(names), X, scale), limit_rows(physical, limits)
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
-    least = max(min(physical.smallest(start).values()) / 2, 0.0)
+    least = float(np.clip(min(physical.smallest(start).values()) / 2, 0.0, LEAST))
     found = closest(np.diag(1 / scale), chi0 / scale, physical.conditions, rows, space, least=least)
     kept = found.solved and min(physical.smallest(found.chi).values()) >= 0
     return found.chi if kept else start
@@ -168,11 +169,14 @@ def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Reference 
     return Reference(kind, chi0, scales(physical), numbers, weight)
 
 
-def unsolved(status: str, rows: Rows) -> str:
-    """What happened, the likely cause, what to try."""
-    if status.startswith("infeasible"):
-        named = ", ".join(dict.fromkeys(rows.names)) or "none given"
-        return f"no physical robot within the limits ({named}); widen or leave out the one that contradicts the others"
+def unsolved(status: str, rows: Rows, attempt: Callable[[Rows], Found]) -> str:
+    """What happened, the likely cause, what to try. attempt : the same problem with other rows; each limit is released in turn."""
+    helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
+    if helps:
+        return f"no physical robot within the limits; there is one without {' or without '.join(helps)}: widen it or leave it out"
+    if status.startswith("infeasible") and rows.names:
+        named = ", ".join(dict.fromkeys(rows.names))
+        return f"no physical robot within the limits ({named}); more than one of them contradicts the others: leave them out one by one"
     return f"the semidefinite program was not solved ({status}); try another margin, a prior, or bounds on the masses"
 
 

@@ -40,7 +40,7 @@ from runtime.mapping import structure
 from runtime.model import GeneratedModel
 from runtime.observation import Observation
 from runtime.physical import PhysicalModel, physical_model
-from runtime.studies.consistency import Distance, closest, everything
+from runtime.studies.consistency import Distance, Found, Rows, closest, everything
 from runtime.study import EstimateSettings
 
 INCREASE = 1.01  # of the residual norm that weight: auto allows
@@ -149,9 +149,13 @@ def fitted(R: Array, z: Array, physical: PhysicalModel, options: Options, weight
     """chi, shape (p,), of min ||R chi - z||^2 + weight D(chi) under the conditions; R (m, p), z (m,), ||z|| about 1."""
     rows, space = limit_rows(physical, options), everything(scales(physical))
     pull = pulled(physical, options.prior, weight)
-    found = closest(R, z, physical.conditions, rows, space, least=options.margin, pull=pull)
+
+    def attempt(within: Rows) -> Found:
+        return closest(R, z, physical.conditions, within, space, least=options.margin, pull=pull)
+
+    found = attempt(rows)
     if not found.solved:
-        raise InputError(unsolved(found.status, rows))
+        raise InputError(unsolved(found.status, rows, attempt))
     return found.chi
 
 

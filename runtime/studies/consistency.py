@@ -40,6 +40,11 @@ class Rows:
     lower: Array
     upper: Array
 
+    def without(self, name: str) -> Rows:
+        """The rows of other names."""
+        kept = [k for k, own in enumerate(self.names) if own != name]
+        return Rows(tuple(self.names[k] for k in kept), self.A[kept], self.lower[kept], self.upper[kept])
+
 
 @dataclass(frozen=True, eq=False)
 class Space:

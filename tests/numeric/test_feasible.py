@@ -107,7 +107,7 @@ def test_noise_free_records_give_the_parameters_back(tx40) -> None:
     found = estimate(simulated(tx40, truth, 0.0), FEASIBLE, model=tx40)
     np.testing.assert_allclose(found.X, truth, atol=1e-9)
     standard = np.array(list(found.details["standard"].values()))
-    np.testing.assert_allclose(standard, values(tx40), atol=1e-3)  # nearest to the values, and these have the torques
+    np.testing.assert_allclose(standard, values(tx40), atol=1e-6)  # nearest to the values, and these have the torques
 
 
 def test_optimum_is_that_of_a_parametrisation_of_all_physical_arms(arm) -> None:
@@ -225,8 +225,15 @@ def test_json_keeps_the_standard_parameters(arm) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"total_mass": -1.0}, "total_mass"),
-        ({"bounds": {"M1": [3, None], "MX1": [None, -9]}, "centre": {"1": [[0, 1], [0, 1], [0, 1]]}}, "centre of link 1"),
+        ({"total_mass": -1.0}, "without total_mass: widen"),
+        (
+            {"bounds": {"M1": [3, None], "MX1": [None, -9]}, "centre": {"1": [[0, 1], [0, 1], [0, 1]]}},
+            "one without bounds of MX1 or without centre of link 1",
+        ),
+        (
+            {"bounds": {"M1": [3, None], "M2": [3, None]}, "total_mass": [0, 4]},
+            "without bounds of M1 or without bounds of M2 or without total_mass",
+        ),
         ({"bounds": {"mass": [0, 1]}}, "no standard parameter mass"),
         ({"centre": {"9": [[0, 1], [0, 1], [0, 1]]}}, "no link '9'"),
         ({"ellipsoid": {"1": {"centre": [0, 0, 0], "axes": [1, 0, 1]}}}, r"ellipsoid\.1\.axes"),
