@@ -1,0 +1,207 @@
+"""Growth of cost: time and memory against samples, joints and runs, as a log-log figure.
+
+    python benchmarks/growth.py [-o docs/growth.png] [--quick]
+
+Samples: the TX40 regressor into a reused store and the distinct signals through the decimation, by the NumPy and the C module; largest resident set of
+`symgen identify` with the whole record in memory and by blocks (memory.py). Joints, 2 to 30: revolute chains and binary trees with friction; generation
+from the robot file to the text of the module, and the regressor of each. Runs: a resolution study of the TX40 with 9000 samples.
+
+One core, one BLAS thread, CPU time, the least of three after a warm-up. The least of three under an unknown load is good for slopes, which is what the figure is for; ratios
+between contenders are measured in interleaved rounds by the other files of this folder. The numbers of the figure are printed.
+"""
+
+# ruff: noqa: E402
+from __future__ import annotations
+
+import argparse
+import os
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"  # before numpy
+
+import numpy as np
+from matplotlib.figure import Figure
+from memory import BLOCK, identified, write_npz
+
+from runtime.cestac import cestac
+from runtime.columns import DecimatedSignals, distinct_entries
+from runtime.model import GeneratedModel, load_model
+from runtime.record import Record
+from runtime.signals import States, decimation_plan
+from runtime.studies.compile_cache import FallbackWarning
+from runtime.studies.compiled import compiled_model
+from runtime.study import CestacSettings, Decimate, Study
+from symgen.description import load_robot, parse_robot
+from symgen.emit import generate_files, generate_module
+
+SAMPLES = (1_000, 10_000, 100_000, 1_000_000)
+JOINTS = (2, 3, 4, 6, 8, 12, 16, 20, 25, 30)
+RUNS = (4, 16, 64, 256)
+Curves = dict[str, list[tuple[float, float]]]  # label: points
+
+
+def least(function: Callable[[], object], repeats: int = 3) -> float:
+    """Least CPU time of some calls, after one that is not counted."""
+    function()
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        function()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def emitted(name: str, folder: Path) -> tuple[GeneratedModel, GeneratedModel]:
+    """(NumPy, C) modules of a packaged robot."""
+    for file, text in generate_files(load_robot(name), targets=("numpy", "c"), command=name).items():
+        (folder / file).write_text(text, encoding="utf-8")
+    model = load_model(name, folder=folder)
+    return model, compiled_model(model, cache=folder / "cache")
+
+
+def motion(N: int, n: int) -> States:
+    return States(*np.random.default_rng(N).uniform(-2, 2, (3, N, n)))
+
+
+def evaluation(model: GeneratedModel, states: States) -> float:
+    """Seconds of a regressor into a store already in use."""
+    out = model.store(len(states))
+    return least(lambda: model.regressor(states.q, states.qd, states.qdd, out=out))
+
+
+def by_samples(models: dict[str, GeneratedModel], samples: tuple[int, ...]) -> Curves:
+    """Seconds of a regressor, and of the decimated signals."""
+    found: Curves = {}
+    for label, model in models.items():
+        for N in samples:
+            states = motion(N, len(model.JOINTS))
+            found.setdefault(f"regressor, {label}", []).append((N, evaluation(model, states)))
+            entries = distinct_entries(model, {})
+            columns = DecimatedSignals(model, entries, {}, decimation_plan(N, 40, Decimate(factor=40)))
+            found.setdefault(f"decimated signals, {label}", []).append((N, least(lambda: columns(states))))  # noqa: B023
+    return found
+
+
+def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Curves:
+    """MB of `symgen identify`, with the whole record in memory and by blocks, beside what W would take."""
+    found: Curves = {"whole record": [], "by blocks": [], "W alone (never formed)": []}
+    for N in samples:
+        record = write_npz(model, N, folder)
+        found["whole record"].append((N, identified(record, "off")["bytes"] / 1e6))
+        found["by blocks"].append((N, identified(record, BLOCK)["bytes"] / 1e6))
+        found["W alone (never formed)"].append((N, 8 * 6 * len(model.BASE_PARAMETERS) * N / 1e6))
+        record.unlink()
+    return found
+
+
+def arm(n: int, tree: bool) -> bytes:
+    """Robot file of n revolute joints, a chain or a binary tree, axes at right angles in turn, viscous and Coulomb friction."""
+    frames, constants = [], ["g: 9.81"]
+    for j in range(1, n + 1):
+        ant = (j // 2 if j > 2 else j - 1) if tree else j - 1
+        length = f"L{j}"
+        constants.append(f"{length}: {0.2 + 0.01 * j:.2f}")
+        d, r = (length, "0") if j % 2 else ("0", length)
+        frames.append(f"  {j}: {{ant: {ant}, sigma: 0, alpha: {('0', '-pi/2', 'pi/2')[j % 3]}, d: {d}, theta: q{j}, r: {r}}}")
+    elements = "elements:\n  FV: {kind: viscous, along: all}\n  FS: {kind: coulomb, along: all}\n"
+    head = f"symgen: 1\nname: arm{n}\ngravity: [0, 0, -g]\nconstants: {{{', '.join(constants)}}}\nframes:\n"
+    return (head + "\n".join(frames) + "\n" + elements).encode()
+
+
+def by_joints(folder: Path, joints: tuple[int, ...], N: int = 4000) -> tuple[Curves, Curves]:
+    """Seconds of generation, and nanoseconds of a regressor per sample."""
+    generation: Curves = {}
+    speed: Curves = {}
+    for tree in (False, True):
+        shape = "tree" if tree else "chain"
+        for n in joints:
+            robot = parse_robot(arm(n, tree), file="arm.yaml")
+            generation.setdefault(shape, []).append((n, least(lambda: generate_module(robot), 1)))  # noqa: B023
+            own = folder / f"{shape}{n}"
+            own.mkdir()
+            for file, text in generate_files(robot, targets=("numpy", "c")).items():
+                (own / file).write_text(text, encoding="utf-8")
+            model = load_model(f"arm{n}", folder=own)
+            start = os.times()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", FallbackWarning)
+                c = compiled_model(model, cache=own / "cache")
+            end = os.times()
+            states = motion(N, n)
+            contenders = {"NumPy": model} | ({"C": c} if c is not model else {})
+            for label, found in contenders.items():
+                speed.setdefault(f"{shape}, {label}", []).append((n, 1e9 * evaluation(found, states) / N))
+            if c is not model:
+                spent = end.children_user + end.children_system - start.children_user - start.children_system
+                generation.setdefault(f"{shape}, compiling C", []).append((n, spent))
+    return generation, speed
+
+
+def by_runs(models: dict[str, GeneratedModel], runs: tuple[int, ...]) -> Curves:
+    """Seconds of a resolution study."""
+    rng, N, n = np.random.default_rng(5), 9000, 6
+    t = np.arange(N) / 5000
+    w = 2 * np.pi * rng.uniform(0.3, 2.5, (5, n))
+    q = (rng.uniform(-0.4, 0.4, (5, n)) * np.sin(w * t[:, None, None] + rng.uniform(0, 6, (5, n)))).sum(1)
+    record = Record(t=t, q=q, tau=rng.standard_normal((N, n)), rate=5000.0, name="motion")
+    found: Curves = {}
+    for label, model in models.items():
+        for R in runs:
+            study = Study(cestac=CestacSettings(delta=(1e-3,), runs=R, columns="all"))
+            found.setdefault(label, []).append((R, least(lambda: cestac(model, record, study), 1)))  # noqa: B023
+    return found
+
+
+def slope(points: list[tuple[float, float]]) -> float:
+    """Exponent of the growth over the last three points."""
+    upper = points[-3:]
+    (x, y) = np.log(np.array(upper)).T
+    return float(np.polyfit(x, y, 1)[0])
+
+
+def panel(axes: object, curves: Curves, x: str, y: str) -> None:
+    print(f"\n{y} against {x}")
+    for k, (label, points) in enumerate(curves.items()):
+        exponent = slope(points)
+        axes.loglog(
+            *zip(*points, strict=True), marker="o", ms=3, lw=1.2, ls="-" if k % 2 == 0 else "--", label=f"{label}  ({exponent:.2f})"
+        )  # type: ignore[attr-defined]
+        print(f"  {label:32} exponent {exponent:5.2f}   " + "  ".join(f"{a:g}: {b:.3g}" for a, b in points))
+    axes.set(xlabel=x, ylabel=y)  # type: ignore[attr-defined]
+    axes.grid(True, which="major", lw=0.4, alpha=0.6)  # type: ignore[attr-defined]
+    axes.legend(fontsize=7, frameon=False, title="(exponent over the last three points)", title_fontsize=6.5)  # type: ignore[attr-defined]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/growth.png"))
+    parser.add_argument("--quick", action="store_true", help="few points, to see whether it runs")
+    arguments = parser.parse_args()
+    samples, joints, runs = (SAMPLES[:2], (2, 6), RUNS[:2]) if arguments.quick else (SAMPLES, JOINTS, RUNS)
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        numpy_model, c = emitted("tx40", folder)
+        models = {"NumPy": numpy_model} | ({"C": c} if c is not numpy_model else {})
+        peaks = memory(folder, numpy_model, samples[1:])  # first: a process inherits the largest resident set of the one that starts it
+        figure = Figure(figsize=(11, 6.6), layout="constrained")
+        axes = figure.subplots(2, 3).ravel()
+        panel(axes[0], by_samples(models, samples), "samples, TX40", "CPU time, s")
+        panel(axes[1], peaks, "samples, TX40", "peak memory of an identification, MB")
+        panel(axes[2], by_runs(models, runs), "runs of 9000 samples, TX40", "CPU time of a resolution study, s")
+        generation, speed = by_joints(folder, joints)
+        panel(axes[3], {k: v for k, v in generation.items() if "C" not in k}, "joints", "CPU time of generation, s")
+        panel(axes[4], {k: v for k, v in generation.items() if "C" in k}, "joints", "CPU time of compiling C, s")
+        panel(axes[5], speed, "joints", "regressor, ns a sample")
+    arguments.output.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(arguments.output, dpi=130)
+    print(f"\n{arguments.output}")
+
+
+if __name__ == "__main__":
+    main()
