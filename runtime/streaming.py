@@ -17,7 +17,8 @@ from typing import TypeVar
 import numpy as np
 
 from runtime.columns import DistinctSignals, Entries, distinct_entries
-from runtime.errors import InputError
+from runtime.errors import InputError, SettingsError
+from runtime.estimators import LINEAR
 from runtime.estimators.correlated import BLOCKS, SHORTEST
 from runtime.estimators.reduction import Reduction, Segment, SegmentFactors, Window
 from runtime.model import GeneratedModel
@@ -26,7 +27,7 @@ from runtime.record_stream import Queue, Stream, recut
 from runtime.rows import per_joint
 from runtime.signals import States, decimation_factor, decimation_plan, kept_samples
 from runtime.stages import Chain, Stage, StreamedDecimation, derivative_stage, median_stage, position_stage, velocity_stage
-from runtime.study import Signals, Study, to_mapping
+from runtime.study import EstimateSettings, Signals, Study, to_mapping
 
 Array = np.ndarray
 Block = TypeVar("Block", bound=tuple[Array, ...])
@@ -67,6 +68,7 @@ def reduce_records(
     """
     if not streams:
         raise InputError("no record to reduce")
+    _require_reducible(study.estimate)
     layouts = [layout(stream, study) for stream in streams]
     span = min(at.t0 for at in layouts), max(at.t1 for at in layouts)
     cuts = tuple(windows if windows is not None else study.validate.split or halves(*span))
@@ -98,6 +100,16 @@ def reduce_records(
         settings={**several.settings, "stream": {"block": max(stream.block for stream in streams)}},
         files=all_files([stream.files for stream in streams]),
     )
+
+
+def _require_reducible(settings: EstimateSettings) -> None:
+    """Raise SettingsError, before anything is read, for estimates that need the rows themselves."""
+    if settings.method not in LINEAR:
+        message = f"{settings.method} needs the rows, and this record is read by blocks; use {' or '.join(LINEAR)}, or stream: off"
+        raise SettingsError(message, path=("estimate", "method"))
+    if settings.weights == "covariance":
+        message = "covariance needs the rows of an instant together, and this record is read by blocks; use weights: joint, or stream: off"
+        raise SettingsError(message, path=("estimate", "weights"))
 
 
 def halves(t0: float, t1: float) -> tuple[Window, Window]:

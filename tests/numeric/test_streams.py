@@ -249,6 +249,9 @@ def test_what_needs_the_rows_is_refused(tx40):
     reduction = reduce_records(model, [RecordStream(record, 5000)], short)
     with pytest.raises(SettingsError, match="stream: off"):
         estimate(reduction, EstimateSettings("wls", "covariance"))
+    for refused in (EstimateSettings("wls", "covariance"), EstimateSettings("feasible")):
+        with pytest.raises(SettingsError, match="read by blocks"):
+            reduce_records(model, [RecordStream(record, 5000)], replace(short, estimate=refused))
     with pytest.raises(InputError, match="cut by the windows"):
         reduction.between(1.0, 1.7)
     with pytest.raises(InputError, match=r"no sample in rows\.window"):
