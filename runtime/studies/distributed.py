@@ -112,7 +112,7 @@ def _submitted(client: Any, task: Callable[[C, K], R], context: C, keys: list[K]
     with _answering(client.scheduler.address):
         shared = client.scatter(context, broadcast=True, hash=False)
         futures = {client.submit(_run, task, shared, key, pure=False): key for key in keys}
-    for future, result in as_completed(list(futures), with_results=True, raise_errors=False):
+    for future, result in as_completed(list(futures), loop=client.loop, with_results=True, raise_errors=False):
         key = futures.pop(future)
         error = result[1] if future.status == "error" else None
         if future.status in ("cancelled", "lost") or isinstance(error, KilledWorker):

@@ -27,11 +27,9 @@ STUDY = Study(signals=Signals(median=1, lowpass=Lowpass(cutoff=20)), cestac=Cest
 @pytest.fixture(scope="module")
 def cluster():
     """Two processes on this machine, nothing on the network."""
-    with (
-        dask.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1") as local,
-        dask.Client(local) as client,
-    ):
-        client.register_plugin(SearchPath(str(Path(__file__).parent)))
+    with dask.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1") as local:
+        with dask.Client(local) as client:
+            client.register_plugin(SearchPath(str(Path(__file__).parent)))
         yield local
 
 
