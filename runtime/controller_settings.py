@@ -148,7 +148,8 @@ class Controller:
     def __post_init__(self) -> None:
         _positive("rate", self.rate)
         _positive("pole_step", self.pole_step)
-        _not_negative("settle", self.settle)
+        if not 0 <= self.settle <= 60:
+            raise SettingsError(f"{self.settle}; expected 0 to 60 s", path=("settle",))
         if self.delay not in (0, 1):
             raise SettingsError(f"{self.delay} ticks; expected 0 or 1", path=("delay",))
         if self.record_every < 1:

@@ -28,6 +28,7 @@ MARGIN = 0.9  # of the limits of speed and acceleration, for random points
 REACH = 0.35  # of the range of a joint, to each side of its middle
 RAMP = 1 / 3  # of each piece: acceleration, constant velocity, deceleration
 RATE_TOLERANCE = 1e-3
+LONGEST = 20_000_000  # ticks
 UNITS = {"q": "", "qd": "/s", "qdd": "/s^2"}
 
 
@@ -76,9 +77,12 @@ def reference_of(controller: Controller, model: GeneratedModel, *, records: Sequ
     elif settings.record is not None:
         found = _of_record(records, settings.record, rate)
     elif settings.motion is not None:
-        _, q, qd, qdd = motion_from_mapping(settings.motion).sampled(rate)
+        motion = motion_from_mapping(settings.motion)
+        _check_length(motion.duration, rate, "motion")
+        _, q, qd, qdd = motion.sampled(rate)
         found = Reference(rate, q, qd, qdd)
     elif settings.points is not None:
+        _check_length(settings.points.duration, rate, "points")
         found = point_to_point(model, settings.points, rate)
     else:
         raise SettingsError("nothing to follow; give one of file, record, motion, points", path=("controller", "reference"))
@@ -87,6 +91,11 @@ def reference_of(controller: Controller, model: GeneratedModel, *, records: Sequ
     if settings.limits == "refuse":
         check_limits(found, model.LIMITS, model.JOINTS)
     return found
+
+
+def _check_length(duration: float, rate: float, key: str) -> None:
+    if duration * rate > LONGEST:
+        raise SettingsError(f"{duration:g} s at {rate:g} Hz; at most {LONGEST:,} ticks", path=("controller", "reference", key))
 
 
 def read_reference(path: Path, rate: float, n: int) -> Reference:

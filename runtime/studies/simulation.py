@@ -26,7 +26,7 @@ from runtime.errors import InputError, SettingsError
 from runtime.model import GeneratedModel
 from runtime.reference import Reference
 from runtime.simulation_result import Sensitivity, Simulation, SimulationError
-from runtime.studies.simulation_friction import DryFriction, dry_friction
+from runtime.studies.simulation_friction import REST, DryFriction, dry_friction
 from runtime.studies.simulation_loop import Plan, blocks, compiled, tick_function
 from runtime.studies.simulation_tangent import tangent_along, tangent_function
 from runtime.symbolic_model import SymbolicModel, load_symbolic
@@ -36,6 +36,7 @@ Array = np.ndarray
 POINTS = 12  # of the reference where inertia and poles are looked at
 BLOCK, TANGENT_BLOCK = 250, 25  # ticks in one call
 UNSTABLE = 1 + 1e-6  # modulus of a discrete pole
+MOST_SUBSTEPS = 200
 FAR = 1e3  # times the range of the reference, plus 1 rad or m: the loop has left it
 
 
@@ -148,10 +149,11 @@ class Simulator:
         _check_motion(states[plan.settling :, :n], reference)
         before = np.vstack([plan.x, states[:-1]])[plan.settling :]
         y, tau, qdd = np.split(out[plan.settling :], 3, axis=1)
+        qd = before[::every, n : 2 * n]
         return Simulation(
             t=reference.t[::every],
             q=before[::every, :n],
-            qd=before[::every, n : 2 * n],
+            qd=np.where(np.abs(qd) <= REST, 0.0, qd),
             qdd=qdd[::every],
             tau=tau[::every],
             q_measured=y[::every],
@@ -184,7 +186,13 @@ class Simulator:
                     time=time,
                 )
             fastest = max(fastest, continuous_pole(self.law, A, B, g))
-        return max(1, ceil(fastest / self.controller.rate / self.controller.pole_step))
+        steps = max(1, ceil(fastest / self.controller.rate / self.controller.pole_step))
+        if steps > MOST_SUBSTEPS:
+            raise SettingsError(
+                f"{steps} integration steps per tick, for a pole at {fastest:.3g} 1/s; at most {MOST_SUBSTEPS}: raise the rate or pole_step, or lower the gains",
+                path=("controller", "rate"),
+            )
+        return steps
 
     def tick(self, substeps: int) -> Any:
         """The CasADi function of one tick (`simulation_loop.tick_function`)."""

@@ -299,6 +299,7 @@ def test_integral_settles_and_clamps(emps):
         ({"law": {"kind": "pid", "kp": 0}}, r"expected a gain for every joint"),
         ({"torque": {"disturbance": 1.0, "bandwidth": 3000}}, r"bandwidth: 3000.0 Hz; expected less than half"),
         ({"values": {"ZZ9": 1.0}}, r"no standard parameter ZZ9"),
+        ({"pole_step": 1e-5}, r"integration steps per tick"),
         ({"start": [0.0]}, r"start \[0\.\]; expected 6"),
     ],
 )
@@ -343,6 +344,7 @@ def test_a_loop_that_is_lost(tx40, truth):
         ({"limits": "refuse", "motion": {"parts": [{"family": "fourier", "harmonics": 1, "p": [[9.0, 0.0, 0.0]] * 6}]}},
          r"leaves the limits of joint 1 at 0 s: q = 9 rad"),
         ({}, "nothing to follow"),
+        ({"points": {"duration": 1e9}}, r"points: 1e\+09 s at 5000 Hz; at most 20,000,000 ticks"),
         ({"record": 0}, "the study has 0"),
         ({"file": "ref.csv"}, r"no column q3 among t, q1, q2; expected q1 \.\.\. q6"),
     ],
@@ -375,6 +377,7 @@ def test_settings_are_checked():
         ({"reference": {"record": 0, "points": {}}}, "record and points; expected one of"),
         ({"encoder": {"step": -1}}, "expected positive numbers"),
         ({"torque": {"noise": -1}}, "expected 0 or more"),
+        ({"settle": 1e9}, "expected 0 to 60 s"),
         ({"velocity": "filtered"}, "expected difference or averaged"),
     ):
         with pytest.raises(SettingsError, match=said.replace(".", r"\.")):
