@@ -44,10 +44,21 @@ ASSUMED = (
 class Run(Protocol):
     """What is used of a simulation: arrays of shape (N, n) at the recorded ticks."""
 
-    q: Array
-    qd: Array
-    qdd: Array
-    tau: Array
+    @property
+    def q(self) -> Array:
+        """Position."""
+
+    @property
+    def qd(self) -> Array:
+        """Velocity."""
+
+    @property
+    def qdd(self) -> Array:
+        """Acceleration."""
+
+    @property
+    def tau(self) -> Array:
+        """Torque of the drives."""
 
 
 class Simulator(Protocol):

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from runtime.closed_loop import Simulator, closed_loop
 from runtime.drives import Coupling, Drives
 from runtime.essential import Essential, essential
 from runtime.estimate import Estimate
-from runtime.estimators import LINEAR, estimate, linear_companion, point_estimate
+from runtime.estimators import CLOSED_LOOP, LINEAR, estimate, linear_companion, point_estimate
 from runtime.estimators.reduction import Reduction, Window
 from runtime.estimators.tls import tls_options
 from runtime.model import GeneratedModel
@@ -142,14 +143,16 @@ def identification(
     records: Sequence[Record | Stream],
     *,
     further: Sequence[Record | Stream] = (),
+    simulator: Simulator | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Identification:
     """Identify by the settings of `study`.
 
     records : joint side, as read by study.record, in memory or by blocks.
     further : those of study.validate.record, predicted with the parameters found.
+    simulator : of the section `controller`; needed by iv, didim and cloe.
     """
-    observation = observed(model, records, study)
+    observation = observed(model, records, study, simulator=simulator)
     found = essential(observation, study.essential, linear_companion(study.estimate), model=model, provenance=provenance)
     linear = study.estimate.method in LINEAR
     chosen = found.all_parameters if linear else estimate(observation, study.estimate, model=model, provenance=provenance)
@@ -177,10 +180,20 @@ def identification(
 
 
 def observed(
-    model: GeneratedModel, records: Sequence[Record | Stream], study: Study, *, windows: Sequence[Window] | None = None
+    model: GeneratedModel,
+    records: Sequence[Record | Stream],
+    study: Study,
+    *,
+    windows: Sequence[Window] | None = None,
+    simulator: Simulator | None = None,
 ) -> Observation | Reduction:
-    """The rows of the records, or what is left of them where they are read by blocks; windows : as in `streaming.reduce_records`."""
+    """The rows of the records, or what is left of them where they are read by blocks; windows : as in `streaming.reduce_records`.
+
+    simulator : where the method simulates the closed loop, the rows carry it along.
+    """
     in_memory = [record for record in records if isinstance(record, Record)]
+    if simulator is not None and in_memory:
+        return closed_loop(model, in_memory, study, simulator, reference=study.estimate.options.get("reference", "known")).measured()
     if in_memory:
         return stack([rows_of(model, record, study) for record in in_memory])
     return reduce_records(model, [record for record in records if not isinstance(record, Record)], study, windows=windows)
@@ -202,13 +215,15 @@ def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record 
     if not (drives.ratio - np.diag(np.diag(drives.ratio))).any():
         return {}
     fits: dict[Coupling, Estimate] = {}
+    simulated = study.estimate.method in CLOSED_LOOP
+    compared = linear_companion(study.estimate) if simulated else point_estimate(study.estimate)
     for coupling in COUPLINGS:
         changed: list[Record | Stream] = []
         for record, settings in zip(records, study.record, strict=True):
             used, wanted = drives.decoupled(settings.coupling), drives.decoupled(coupling)
             again = recoupled(record, used, wanted) if isinstance(record, Record) else recoupled_stream(record, used, wanted)
             changed.append(again)
-        fits[coupling] = estimate(observed(model, changed, study, windows=()), point_estimate(study.estimate), model=model)
+        fits[coupling] = estimate(observed(model, changed, study, windows=()), compared, model=model)
     return fits
 
 

@@ -27,7 +27,7 @@ from runtime.study import EstimateSettings
 
 T = TypeVar("T")
 
-__all__ = ["LINEAR", "METHODS", "estimate", "linear_companion", "linear_system", "point_estimate"]
+__all__ = ["CLOSED_LOOP", "LINEAR", "METHODS", "estimate", "linear_companion", "linear_system", "point_estimate"]
 
 
 class Estimator(Protocol):
@@ -70,6 +70,9 @@ def linear_estimate(
     system = linear_system(observation, settings)
     return assemble(system, system.solve(), model=model, provenance=provenance)
 
+
+CLOSED_LOOP = ("iv", "didim", "cloe")
+"""Methods that simulate the closed loop of the records."""
 
 METHODS: Mapping[str, Estimator] = {
     **dict.fromkeys(LINEAR, linear_estimate),

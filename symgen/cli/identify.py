@@ -19,11 +19,15 @@ from symgen.cli.session import (
     single_thread,
     study_text,
     study_with_record,
+    symbolic_file,
 )
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
+    from runtime.closed_loop import Simulator
     from runtime.identification import Identification
+    from runtime.model import GeneratedModel
+    from runtime.study import Study
 
 
 def identify(
@@ -59,7 +63,9 @@ def identify(
         further = records_or_streams(study.validate.record, model, study.stream, folder=folder)
         model = in_target(robot, model, target)
         computed = {"target": target_of(model), "processor": processor()}
-        found = identification(model, study, records, further=further, provenance={**origin(records), **computed})
+        found = identification(
+            model, study, records, further=further, simulator=simulator_of(robot, model, study), provenance={**origin(records), **computed}
+        )
         more = beside(model, study, folder, records, found, origin(records), physical=physical, friction=friction)
         if output is not None:
             write_all(output, identification_files(found, study_text(study, folder, output), more))
@@ -68,6 +74,18 @@ def identify(
             typer.echo(f"report: {output / 'report.html'}", err=True)
     if found.every.status == "rank-deficient":
         raise typer.Exit(NEGATIVE)
+
+
+def simulator_of(robot: str, model: GeneratedModel, study: Study) -> Simulator | None:
+    """The closed loop of the study where its method simulates one; else None."""
+    from runtime.estimators import CLOSED_LOOP
+
+    if study.estimate.method not in CLOSED_LOOP or study.controller is None:
+        return None
+    from runtime.studies.simulation import Simulator
+    from runtime.symbolic_model import load_symbolic
+
+    return Simulator(model, study.controller, symbolic=load_symbolic(symbolic_file(robot, model), of=model))
 
 
 def console_text(found: Identification, more: Beside | None = None) -> str:
