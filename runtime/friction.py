@@ -13,8 +13,8 @@ and linear but for VS, which is searched. Residuals are correlated: deviations t
 criterion count N/T samples, T the correlation time of the residual in rows. The law is chosen on blocks of time that did not fit it.
 X is held: this says what form friction has, not what the other parameters would be with it.
 
-References: Armstrong-Helouvry, Dupont and Canudas de Wit (1994), section 2, for the laws; Gautier and Jubien (2015) and Hamon, Gautier and Garrec
-(2010) for friction that grows with the load.
+References: Armstrong-Helouvry, Dupont and Canudas de Wit (1994), section 2, for the laws; Hamon, Gautier and Garrec (2010) for friction that
+grows with the load.
 """
 
 from __future__ import annotations
@@ -24,12 +24,11 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.stats import f as fisher
 
 from runtime.errors import InputError
 from runtime.estimate import Estimate, aligned
-from runtime.estimators.correlated import block_covariance, block_of_rows, default_block
+from runtime.estimators.correlated import block_of_rows, default_block
+from runtime.friction_laws import LAWS, Terms, correlation_time, deviations, fitted, held_out_error, joined, law_torque, p_value, percent
 from runtime.model import GeneratedModel, require
 from runtime.observation import decimated_torque, observation_from_states
 from runtime.physical import physical_model
@@ -43,23 +42,8 @@ Array = np.ndarray
 OWN = ("viscous", "coulomb", "offset")  # kinds of elements that make the curve
 BINS = 40
 NORMAL = 1.96  # half width of a 95 % interval in deviations
-SLOWEST, FASTEST = 0.005, 0.5  # of the largest speed: where VS is searched
 GAIN = 0.01  # a law with more terms must lower the held-out error by this share, and pass the F-test at ...
 LEVEL = 0.01
-
-
-@dataclass(frozen=True, eq=False)
-class Terms:
-    """Signals of one joint at the rows: friction torque f, velocity v, and the terms of the laws, each of shape (N,); block of time of each row.
-
-    excess : the term of FST for a given VS.
-    """
-
-    f: Array
-    v: Array
-    block: Array
-    linear: Mapping[str, Array]
-    excess: Callable[[float], Array]
 
 
 @dataclass(frozen=True)
@@ -136,7 +120,7 @@ def friction_curves(model: GeneratedModel, records: Sequence[Record], study: Stu
     """One curve per joint of the records, joint side, with the parameters of `fit`."""
     require(model, "inverse_dynamics")
     parts = [_terms(model, record, study, fit, k) for k, record in enumerate(records)]
-    return tuple(_curve(str(model.JOINTS[j]), _joined([part[j] for part in parts])) for j in range(len(model.JOINTS)))
+    return tuple(_curve(str(model.JOINTS[j]), joined([part[j] for part in parts])) for j in range(len(model.JOINTS)))
 
 
 def own_friction(model: GeneratedModel, j: int) -> list[int]:
@@ -188,31 +172,14 @@ def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, n
     return terms
 
 
-def _joined(parts: Sequence[Terms]) -> Terms:
-    """The rows of several records."""
-    linear = {name: np.concatenate([part.linear[name] for part in parts]) for name in parts[0].linear}
-    _, block = np.unique(np.concatenate([part.block for part in parts]), return_inverse=True)
-    f, v = (np.concatenate([getattr(part, name) for part in parts]) for name in ("f", "v"))
-    return Terms(f, v, block, linear, lambda VS: np.concatenate([part.excess(VS) for part in parts]))
-
-
-LAWS: Mapping[str, tuple[str, ...]] = {
-    "coulomb+viscous": ("FS", "FV", "OFFSET"),
-    "asymmetric": ("FSP", "FVP", "FSN", "FVN"),
-    "stribeck": ("FS", "FV", "OFFSET", "FST", "VS"),
-    "load": ("FS", "FV", "OFFSET", "FL"),
-    "stribeck+load": ("FS", "FV", "OFFSET", "FL", "FST", "VS"),
-}
-
-
 def _curve(joint: str, terms: Terms) -> FrictionCurve:
     if len(terms.f) < 10 * len(LAWS["stribeck+load"]):
         raise InputError(f"{len(terms.f)} rows of joint {joint}; a friction curve needs more of the record (rows.window, rows.low_speed)")
     every = np.ones(len(terms.f), dtype=bool)
     even = terms.block % 2 == 0
-    fits = {name: _fitted(terms, names, every) for name, names in LAWS.items()}
+    fits = {name: fitted(terms, names, every) for name, names in LAWS.items()}
     first = next(iter(LAWS))
-    residuals = {name: terms.f - _law(terms, found) for name, found in fits.items()}
+    residuals = {name: terms.f - law_torque(terms, found) for name, found in fits.items()}
     squares = {name: float(r @ r) for name, r in residuals.items()}
     count = len(terms.f) / correlation_time(residuals["stribeck+load"])
     laws = []
@@ -222,15 +189,15 @@ def _curve(joint: str, terms: Terms) -> FrictionCurve:
             FrictionLaw(
                 name,
                 fits[name],
-                _deviations(terms, fits[name], residuals[name]),
-                _percent(residuals[name], terms.f),
-                _held_out(terms, names, even),
+                deviations(terms, fits[name], residuals[name]),
+                percent(residuals[name], terms.f),
+                held_out_error(terms, names, even),
                 float(aic),
-                _p_value(squares[first], squares[name], len(LAWS[first]), len(names), count),
+                p_value(squares[first], squares[name], len(LAWS[first]), len(names), count),
             )
         )
     centre, mean, half, mean_of = _bins(terms)
-    drawn = {name: mean_of(_law(terms, found)) for name, found in fits.items()}
+    drawn = {name: mean_of(law_torque(terms, found)) for name, found in fits.items()}
     return FrictionCurve(joint, terms.v, terms.f, centre, mean, half, tuple(laws), _chosen(laws), drawn)
 
 
@@ -239,70 +206,6 @@ def _chosen(laws: Sequence[FrictionLaw]) -> str:
     first, *others = laws
     worth = [law for law in others if law.p_value < LEVEL and law.held_out < (1 - GAIN) * first.held_out]
     return min(worth, key=lambda law: law.held_out, default=first).name
-
-
-def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
-    """The linear terms of a law, (N, terms)."""
-    return np.column_stack([terms.excess(cast(float, VS)) if name == "FST" else terms.linear[name] for name in names if name != "VS"])
-
-
-def _fitted(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
-    """Least squares of a law on some rows; VS by a search on a logarithmic axis."""
-    linear = [name for name in names if name != "VS"]
-
-    def solved(VS: float | None) -> tuple[Array, float]:
-        A, f = _columns(terms, names, VS)[rows], terms.f[rows]
-        x = np.linalg.lstsq(A, f, rcond=None)[0]
-        return x, float(np.sum((f - A @ x) ** 2))
-
-    if "VS" not in names:
-        return dict(zip(linear, map(float, solved(None)[0]), strict=True))
-    grid = np.log(np.abs(terms.v).max() * np.geomspace(SLOWEST, FASTEST, 16))
-    best = grid[np.argmin([solved(float(np.exp(x)))[1] for x in grid])]
-    step = grid[1] - grid[0]
-    ends = (max(best - step, grid[0]), min(best + step, grid[-1]))
-    VS = float(np.exp(minimize_scalar(lambda x: solved(float(np.exp(x)))[1], bounds=ends, method="bounded", options={"xatol": 1e-3}).x))
-    return {**dict(zip(linear, map(float, solved(VS)[0]), strict=True)), "VS": VS}
-
-
-def _law(terms: Terms, found: Mapping[str, float]) -> Array:
-    names = tuple(found)
-    return np.asarray(_columns(terms, names, found.get("VS")) @ [found[name] for name in names if name != "VS"])
-
-
-def _held_out(terms: Terms, names: Sequence[str], even: Array) -> float:
-    """Error in % of rows predicted from the other half of the blocks."""
-    residual = np.empty_like(terms.f)
-    for rows in (even, ~even):
-        residual[~rows] = (terms.f - _law(terms, _fitted(terms, names, rows)))[~rows]
-    return _percent(residual, terms.f)
-
-
-def _deviations(terms: Terms, found: Mapping[str, float], residual: Array) -> dict[str, float]:
-    """Deviations by blocks of time, VS by its derivative."""
-    A = _columns(terms, tuple(found), found.get("VS"))
-    if "VS" in found:
-        VS, h = found["VS"], 1e-4 * found["VS"]
-        A = np.column_stack([A, found["FST"] * (terms.excess(VS + h) - terms.excess(VS - h)) / (2 * h)])
-    T = np.linalg.pinv(np.linalg.qr(A, mode="r"))
-    return dict(zip(found, map(float, np.sqrt(np.diag(block_covariance(A, residual, terms.block, T)))), strict=True))
-
-
-def correlation_time(residual: Array) -> float:
-    """1 + 2 sum of the autocorrelations of a residual up to the first that is not positive, in rows; at least 1."""
-    r = residual - residual.mean()
-    spectrum = np.abs(np.fft.rfft(r, 2 * len(r))) ** 2
-    rho = np.fft.irfft(spectrum)[: len(r)]
-    rho = rho / rho[0] if rho[0] > 0 else np.zeros(len(r))
-    end = int(np.argmax(rho <= 0)) or len(r)
-    return float(max(1 + 2 * rho[1:end].sum(), 1.0))
-
-
-def _p_value(squares_first: float, squares: float, terms_first: int, terms: int, count: float) -> float:
-    if terms == terms_first or squares <= 0 or count <= terms:
-        return 1.0
-    F = max(squares_first / squares - 1, 0.0) * (count - terms) / (terms - terms_first)
-    return float(fisher.sf(F, terms - terms_first, count - terms))
 
 
 def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
@@ -325,8 +228,3 @@ def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
     bin_of[cell] = which
     variance = np.bincount(bin_of, weights=sums**2, minlength=len(count)) / np.maximum(count, 1) ** 2
     return mean_of(terms.v), mean[used], NORMAL * np.sqrt(variance[used]), mean_of
-
-
-def _percent(residual: Array, of: Array) -> float:
-    norm = float(np.linalg.norm(of))
-    return 100 * float(np.linalg.norm(residual)) / norm if norm > 0 else float("nan")

@@ -10,7 +10,8 @@ are free to make a robot of them. `weights` weighs the rows as for ols ("none") 
 options (all of `runtime.feasibility.Limits` too):
     margin     smallest eigenvalue of every condition, SI; 1e-6
     prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from the values of the robot file
-    weight     of D, a number, or "auto": the largest, to half a decade, that raises the residual norm by at most 1 %
+    weight     of D, a number; "auto": the largest, to half a decade, that raises the residual norm by at most 1 %; "held-out": that by which
+               the two halves of the record in time predict each other best
     bootstrap  resampled records (blocks of time) behind `sigma_corrected`, 0 for none; seed
 
 sigma and covariance are those of least squares without conditions, eq. (10): the theory of estimates on the boundary of a cone has no such
@@ -24,7 +25,7 @@ Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018); Lee, Wens
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -54,7 +55,7 @@ class Options(Limits):
 
     margin: float = 1e-6
     prior: Distance = "none"
-    weight: float | Literal["auto"] = "auto"
+    weight: float | Literal["auto", "held-out"] = "auto"
     bootstrap: int = 30
     seed: int = 1
     linear: Mapping[str, Any] = field(default_factory=dict)
@@ -62,8 +63,10 @@ class Options(Limits):
     def __post_init__(self) -> None:
         if not self.margin > 0:
             raise SettingsError(f"{self.margin}; expected a positive number", path=("margin",))
-        if self.weight != "auto" and self.weight < 0:
-            raise SettingsError(f"{self.weight}; expected auto, or 0 or more", path=("weight",))
+        if not isinstance(self.weight, str) and self.weight < 0:
+            raise SettingsError(f"{self.weight}; expected auto, held-out, or 0 or more", path=("weight",))
+        if self.prior == "none" and not isinstance(self.weight, str):
+            raise SettingsError(f"{self.weight} without prior; set prior: euclidean, entropic or pullback", path=("weight",))
         if self.bootstrap == 1 or self.bootstrap < 0 or self.seed < 0:
             raise SettingsError(
                 f"{self.bootstrap} runs, seed {self.seed}; expected 0 or at least 2 runs, and a seed from 0", path=("bootstrap",)
@@ -88,7 +91,10 @@ def feasible(
     if judged.feasible and judged.margin >= options.margin and options.prior == "none":
         X, chi, weight = free.X, judged.chi, 0.0
     else:
-        chi, weight = weighed(system.weighted, physical, options)
+        fixed = (
+            replace(options, weight=held_out_weight(observation, system, physical, options)) if options.weight == "held-out" else options
+        )
+        chi, weight = weighed(system.weighted, physical, fixed)
         X = physical.rows(system.names) @ chi
     if weight == 0:  # nothing was pulled: chi is one of many
         chi = nearest_standard(physical, system.names, X, chi, options)
@@ -101,9 +107,8 @@ def feasible(
         "standard": physical.named(chi),
         "smallest_eigenvalues": smallest,
         "active": active,
-        "prior": options.prior,
+        "options": asdict(options),
         "weight": weight,
-        "bootstrap": options.bootstrap,
         "least_squares": {
             "method": system.settings.method,
             "feasible": judged.feasible,
@@ -115,6 +120,9 @@ def feasible(
         },
     }
     message = " ".join(part for part in (estimate.message, told(system, judged.text, active, estimate, without)) if part)
+    if min(smallest.values()) < 0:
+        estimate = replace(estimate, status="not-converged")
+        message += " The solver left a condition violated: try another margin, a prior, or bounds on the masses."
     scatter = bootstrapped(observation, system, physical, options, weight) if options.bootstrap else estimate.sigma_corrected
     return replace(estimate, message=message, details=details, sigma_corrected=scatter)
 
@@ -134,15 +142,39 @@ def weighed(rows: Factor, physical: PhysicalModel, options: Options) -> tuple[Ar
     def at(weight: float) -> Array:
         return fitted(rows.R11 @ K / size, rows.r12 / size, physical, options, weight)
 
-    if options.prior == "none" or options.weight != "auto":
-        weight = 0.0 if options.prior == "none" else float(options.weight)
-        return at(weight), weight
+    if options.prior == "none":
+        return at(0.0), 0.0
+    if not isinstance(options.weight, str):
+        return at(options.weight), options.weight
     allowed = INCREASE * residual_norm(rows, K @ at(0.0))
     for weight in WEIGHTS:
         chi = at(float(weight))
         if residual_norm(rows, K @ chi) <= allowed:
             return chi, float(weight)
     return at(0.0), 0.0
+
+
+def held_out_weight(observation: Observation, system: System, physical: PhysicalModel, options: Options) -> float:
+    """The weight of D by which the halves of the record predict each other best."""
+    if options.prior == "none":
+        return 0.0
+    middle = float(np.median(observation.t))
+    late = observation.t > middle
+    halves = [part_factor(observation.where(mask), system) for mask in (~late, late)]
+    K = physical.rows(system.names)
+
+    def error(weight: float) -> float:
+        fixed = replace(options, weight=weight)
+        fits = [weighed(half, physical, fixed)[0] for half in halves]
+        return float(np.hypot(residual_norm(halves[1], K @ fits[0]), residual_norm(halves[0], K @ fits[1])))
+
+    return min(map(float, (*WEIGHTS, 0.0)), key=error)
+
+
+def part_factor(part: Observation, system: System) -> Factor:
+    """Factor of some rows with the weights of the joints in the whole."""
+    chosen = part.columns(system.names)
+    return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(1 / np.array(system.scales))
 
 
 def fitted(R: Array, z: Array, physical: PhysicalModel, options: Options, weight: float = 0.0) -> Array:
@@ -169,7 +201,7 @@ def bootstrapped(observation: Observation, system: System, physical: PhysicalMod
     block = block_of_rows(observation, default_block(observation))
     blocks = int(block.max()) + 1
     rng = np.random.default_rng(options.seed)
-    fixed = replace(options, weight=weight)
+    fixed = options if options.prior == "none" else replace(options, weight=weight)
     K, names = physical.rows(system.names), system.names
     W = observation.W[:, [observation.names.index(name) for name in names]]
     runs = []

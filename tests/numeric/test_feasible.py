@@ -21,6 +21,7 @@ from runtime.model import load_model
 from runtime.observation import Observation
 from runtime.physical import INERTIAL, physical_model, pseudo_inertia
 from runtime.study import EstimateSettings
+from runtime.validation import split_validation
 from symgen.description import load_robot
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -186,6 +187,16 @@ def test_limits_hold(arm) -> None:
     assert weights @ chi == pytest.approx(inside, abs=1e-12)
 
 
+def test_held_out_weight_is_that_of_the_best_mutual_prediction(arm) -> None:
+    """Wrong values ask for little pull, right ones for much."""
+    seen = simulated(arm, arm.base_parameters(arm.VALUES), 2.0, N=40)
+    options = {"bootstrap": 0, "prior": "euclidean", "weight": "held-out"}
+    right, wrong = replace_values(arm), replace_values(arm)
+    wrong.VALUES = {name: 3 * x for name, x in right.VALUES.items()}
+    weights = [estimate(seen, EstimateSettings("feasible", options=options), model=m).details["weight"] for m in (right, wrong)]
+    assert weights[0] > 10 * weights[1]
+
+
 @pytest.mark.parametrize("prior", ["euclidean", "entropic", "pullback"])
 def test_a_strong_pull_ends_at_the_values_and_auto_costs_one_per_cent(arm, prior: str) -> None:
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.5)
@@ -239,6 +250,7 @@ def test_json_keeps_the_standard_parameters(arm) -> None:
         ({"ellipsoid": {"1": {"centre": [0, 0, 0], "axes": [1, 0, 1]}}}, r"ellipsoid\.1\.axes"),
         ({"prior": "cad"}, "euclidean or entropic"),
         ({"margin": 0}, "margin"),
+        ({"weight": 1.0}, "set prior"),
         ({"pull": 1}, "unknown key pull"),
     ],
 )
@@ -294,5 +306,8 @@ def test_tx40_record(tx40, tx40_data) -> None:
         q, qd, qdd = rng.uniform(-2, 2, (3, 6))
         torque = oracle.torque(q, qd, qdd, chi)
         np.testing.assert_allclose(tx40.inverse_dynamics(q, qd, qdd, found.X), torque, atol=1e-9 * np.abs(torque).max())
+    for split in (study.validate.split, study.validate.split[::-1]):  # each half predicts the other better than by least squares
+        errors = [split_validation(seen, split, how, model=tx40).predictions[1].relative_error for how in (EstimateSettings(), FEASIBLE)]
+        assert errors[1] < 0.98 * errors[0]
     system = linear(seen, FEASIBLE, Options())
     assert residual_norm(system.weighted, found.X) == pytest.approx(found.residual_norm, rel=1e-9)

@@ -9,7 +9,8 @@ import pytest
 
 from runtime import InputError, Record, observe, read_records, study_from_mapping
 from runtime.estimators import estimate
-from runtime.friction import correlation_time, friction_curves, own_friction
+from runtime.friction import friction_curves, own_friction
+from runtime.friction_laws import correlation_time
 from runtime.io.datasets import dataset_study
 from runtime.model import load_model
 from runtime.report import plots
