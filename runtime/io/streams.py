@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -30,6 +31,7 @@ from runtime.study import SHORTEST, Columns, RecordSettings
 Array = np.ndarray
 
 BLOCK = 65536  # samples read at a time
+KEPT = 2**23  # samples whose time is kept, 64 MB; read again and again in longer records
 LARGE = 100_000_000  # bytes of the files of a record from which it is read by blocks when nothing is said
 
 
@@ -53,6 +55,16 @@ class FileStream:
 
     def times(self) -> Iterator[Array]:
         """Time of the samples, s, by blocks."""
+        if self.samples <= KEPT:
+            yield from np.split(self._clock, range(self.block, self.samples, self.block))
+        else:
+            yield from self._times()
+
+    @cached_property
+    def _clock(self) -> Array:
+        return np.concatenate(list(self._times()))
+
+    def _times(self) -> Iterator[Array]:
         if self.columns.t is None:
             for a in range(0, self.samples, self.block):
                 yield np.arange(a, min(a + self.block, self.samples)) / self.rate

@@ -2,10 +2,12 @@
 
 import gzip
 import sys
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import planar_2r_model as planar
 import pytest
 
 from runtime import Drives, load_model, observe, read_record, read_records, study_from_mapping
@@ -88,6 +90,14 @@ def test_two_files_and_a_rate(tmp_path, samples):
     t, q, tau = (np.concatenate(x) for x in zip(*stream.blocks(), strict=True))
     for found, expected in ((t, whole.t), (q, whole.q), (tau, whole.tau), (np.concatenate(list(stream.times())), whole.t)):
         np.testing.assert_array_equal(found, expected)
+
+
+def test_time_of_long_records_is_not_kept(tmp_path, samples, monkeypatch):
+    stream = open_stream(settings(write("npz", tmp_path, samples)), folder=tmp_path, block=100)
+    monkeypatch.setattr("runtime.io.streams.KEPT", 1000)
+    for _ in range(2):
+        np.testing.assert_array_equal(np.concatenate(list(stream.times())), samples[0])
+    assert "_clock" not in vars(stream)
 
 
 def test_scale_stored_in_the_file(tmp_path, samples):
@@ -260,3 +270,36 @@ def test_what_needs_the_rows_is_refused(tx40):
         reduce_records(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, trim=100)))
     with pytest.raises(InputError, match="no row is left"):
         reduce_records(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, low_speed=100.0)))
+
+
+class Endless:
+    """A stream that is computed while it is read: two sines per joint of the planar arm, nothing kept."""
+
+    name, n, rate, files, block = "endless", 2, 1000.0, {}, 4096
+
+    def __init__(self, samples):
+        self.samples = samples
+
+    def __len__(self):
+        return self.samples
+
+    def times(self):
+        return (np.arange(a, min(a + self.block, self.samples)) / self.rate for a in range(0, self.samples, self.block))
+
+    def blocks(self):
+        for t in self.times():
+            q = np.stack([np.sin(3 * t) + 0.3 * np.sin(7.1 * t), np.cos(4 * t) - 0.5 * np.sin(2.3 * t)], axis=1)
+            yield t, q, 3 * q
+
+
+def test_memory_does_not_grow_with_the_record():
+    """Peak of what Python and NumPy allocate, at 60,000 and at 240,000 samples, beyond the figures' share."""
+    study = study_from_mapping({"signals": {"decimate": {"factor": 20}}, "rows": {"low_speed": 0.1}})
+    peaks = []
+    for samples in (60_000, 240_000):
+        tracemalloc.start()
+        reduction = reduce_records(planar, [Endless(samples)], study)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert reduction.rows[0] > 0.8 * samples / 20
+    assert peaks[1] < 1.25 * peaks[0] < 60e6
