@@ -15,6 +15,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -57,20 +58,31 @@ def shared_object(
     flags = (*flags, *_width())
     parts = (text, " ".join((*flags, *LIBRARIES)).encode(), " ".join(command).encode(), version.encode(), _processor().encode())
     key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    if os.name == "posix" and folder.stat().st_mode & 0o002:
-        raise NotCompiledError(f"anyone may write to the cache folder {folder}; choose another by SYMGEN_CACHE")
-    for found in sorted(folder.glob(f"{key[:32]}-*.so")):
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if os.name == "posix" and folder.stat().st_mode & 0o002:
+            raise NotCompiledError(f"anyone may write to the cache folder {folder}; choose another by SYMGEN_CACHE")
+        return _cached(folder, key[:32], opened) or opened(_compiled(command, flags, path, text, folder, key[:32]))
+    except OSError as e:  # no right to write, full, or mounted without the right to execute
+        raise NotCompiledError(f"cache folder {folder}: {e.strerror or e}; choose another by SYMGEN_CACHE") from e
+
+
+def _cached(folder: Path, key: str, opened: Callable[[Path], ctypes.CDLL]) -> ctypes.CDLL | None:
+    """The object of that key; files that are damaged or do not open are removed."""
+    for found in sorted(folder.glob(f"{key}-*.so")):
         if hashlib.sha256(found.read_bytes()).hexdigest()[:32] == found.stem.partition("-")[2]:
             try:
                 return opened(found)
             except (NotCompiledError, OSError):
                 pass
         found.unlink(missing_ok=True)
-    return opened(_compiled(command, flags, path, text, folder, key[:32]))
+    return None
 
 
 def _compiled(command: Sequence[str], flags: Sequence[str], path: Path, text: bytes, folder: Path, key: str) -> Path:
+    for left in folder.glob(".compiling-*"):  # by a process that was killed
+        if time.time() - left.stat().st_mtime > 2 * TIME:
+            shutil.rmtree(left, ignore_errors=True)
     with TemporaryDirectory(dir=folder, prefix=".compiling-") as scratch:
         source, target = Path(scratch) / path.name, Path(scratch) / f"{path.stem}.so"
         source.write_bytes(text)

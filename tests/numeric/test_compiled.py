@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 import warnings
 from pathlib import Path
 
@@ -268,6 +269,50 @@ def test_folders_that_cannot_be_used(model: GeneratedModel, tmp_path: Path) -> N
     (tmp_path / "open").chmod(0o777)
     if any(map(shutil.which, ("cc", "gcc", "clang"))):
         refused(model, "anyone may write", cache=tmp_path / "open")
+
+
+@needs_compiler
+@pytest.mark.skipif(sys.platform != "linux", reason="nobody may write to /proc")
+def test_a_folder_that_cannot_be_written(model: GeneratedModel) -> None:
+    refused(model, "cache folder /proc/symgen: .*; choose another by SYMGEN_CACHE", cache=Path("/proc/symgen"))
+
+
+FULL = """
+import resource, sys, warnings
+from pathlib import Path
+from runtime import load_model
+from runtime.studies.compiled import compiled_model
+model = load_model("planar_2r", folder=Path(sys.argv[1]))
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
+with warnings.catch_warnings(record=True) as seen:
+    warnings.simplefilter("always")
+    assert compiled_model(model, cache=Path(sys.argv[2])) is model
+print(*(warning.message for warning in seen))
+"""
+
+
+@needs_compiler
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+@pytest.mark.parametrize(("room", "reason"), [(100, "choose another by SYMGEN_CACHE"), (1.1, "failed with")], ids=["source", "object"])
+def test_a_full_disk(room: float, reason: str, folder: Path, tmp_path: Path) -> None:
+    """Files may not grow: NumPy serves, one line says why, no temporary file is left. The first limit is in bytes, the second in C files."""
+    limit = int(room if room > 2 else room * (folder / f"{NAME}.c").stat().st_size)
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, str(folder), str(tmp_path / "cache"), str(limit)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert reason in done.stdout and done.stdout.startswith(f"{NAME}: NumPy in place of C: ") and done.stdout.count("\n") == 1
+    assert list((tmp_path / "cache").iterdir()) == []
+
+
+@needs_compiler
+def test_what_a_killed_process_left_is_removed(model: GeneratedModel, tmp_path: Path) -> None:
+    for name, age in (("old", 1000.0), ("now", 0.0)):
+        (tmp_path / f".compiling-{name}").mkdir()
+        then = time.time() - age
+        os.utime(tmp_path / f".compiling-{name}", (then, then))
+    in_c(model, tmp_path)
+    assert {p.name for p in tmp_path.iterdir() if p.suffix != ".so"} == {".compiling-now"}
 
 
 def test_cache_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
