@@ -67,12 +67,12 @@ class CText(Text):
         self.main_inputs = {symbols[i] for i in main & symbols.keys()}
         marks = [(0, "Inputs"), *headings]
         starts = [start for start, _ in marks]
-        lines: dict[str, list[str]] = {}
+        lines: dict[tuple[int, str], list[str]] = {}  # a title may come again further down: the order of the lines must stay
         for node in self.nodes:
             if node.index in self.named & main and not node.fixed and node.op not in (COS, SIN):
-                title = marks[bisect_right(starts, node.index) - 1][1] if node.index not in under else "Angles"
-                lines.setdefault(title, []).append(self._line(node))
-        return tuple(Section(title, tuple(found)) for title, found in lines.items())
+                mark = bisect_right(starts, node.index) - 1
+                lines.setdefault((-1, "Angles") if node.index in under else (mark, marks[mark][1]), []).append(self._line(node))
+        return tuple(Section(title, tuple(found)) for (_, title), found in lines.items())
 
 
 def _needed(outputs: Iterable[Node]) -> Iterator[int]:
