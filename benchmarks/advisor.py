@@ -33,7 +33,8 @@ from runtime.io.datasets import dataset_study  # noqa: E402
 from runtime.io.records import read_records  # noqa: E402
 from runtime.observation import observe  # noqa: E402
 from runtime.perturbation import perturbation  # noqa: E402
-from runtime.resolution import LIMITS, Sampler, advise  # noqa: E402
+from runtime.resolution import LIMITS, advise  # noqa: E402
+from runtime.sampler import Sampler  # noqa: E402
 from runtime.study import study_from_mapping  # noqa: E402
 from symgen.cli.haptic_record import haptic_record, haptic_study  # noqa: E402
 

@@ -131,8 +131,7 @@ class Perturbation:
     def _at(self, switch: Switch, sigma: float) -> Switched:
         """The switch at one deviation of its speed, interpolated between nodes."""
         node = floor(log(sigma) / log(NODE))
-        share = (sigma / NODE**node - 1) / (NODE - 1)
-        return self._node(switch, node).between(self._node(switch, node + 1), share)
+        return self._node(switch, node).between(self._node(switch, node + 1), sigma)
 
     def _node(self, switch: Switch, node: int) -> Switched:
         key = (switch.column, node)

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.advice import Advice, EncoderAdvice, Limit, Sampled, crossing, sampled
+from runtime.advice import Advice, EncoderAdvice, Limit, crossing
 from runtime.cestac_result import BIASED, DECIDING, NEGLIGIBLE, deciding_names
 from runtime.drives import Drives
 from runtime.errors import InputError, SettingsError
@@ -35,12 +35,11 @@ from runtime.estimate import Estimate
 from runtime.estimators import linear_system
 from runtime.estimators.linear import assemble
 from runtime.model import GeneratedModel
-from runtime.observation import Observation, observation_from_states, observe, stack
+from runtime.observation import observe, stack
 from runtime.perturbation import Normal, Perturbation, perturbation
 from runtime.record import Record
-from runtime.rounding import rounded, stream
-from runtime.signals import filtered_states
-from runtime.study import CestacSettings, EstimateSettings, Study, to_mapping
+from runtime.sampler import ALL, Sampler
+from runtime.study import Study, to_mapping
 
 Array = np.ndarray
 Progress = Callable[[int, int], None]
@@ -53,9 +52,8 @@ RATIO = 1.3
 """Ratio of neighbouring steps of a curve."""
 WALK = 40
 """Steps tried below and above the first guess."""
-BEYOND = 8
-"""Steps of the curve of all encoders below the first limit and above the last: factors of 8."""
-ALL = "all"
+BELOW, ABOVE = 3, 9
+"""Steps of the curve of all encoders below the first limit and above the last: factors of 2 and 10."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +173,7 @@ def _advice(predictor: Predictor, label: str, encoders: Sequence[int], names: Se
     low = next((k for k in range(0, -WALK, -1) if worst(k) < LIMITS[0]), -WALK)
     high = next((k for k in range(low, WALK) if worst(k) > LIMITS[-1]), WALK - 1)
     if label == ALL:
-        low, high = low - BEYOND, high + BEYOND
+        low, high = low - BELOW, high + ABOVE
     for k in range(low, high + 1):
         worst(k)
     order = sorted(known)
@@ -186,57 +184,6 @@ def _advice(predictor: Predictor, label: str, encoders: Sequence[int], names: Se
         first = int(np.nanargmin(steps)) if np.isfinite(steps).any() else None
         limits.append(Limit(percent, np.inf, "") if first is None else Limit(percent, steps[first], names[decisive[first]]))
     return EncoderAdvice(label, tuple(limits), delta, change)
-
-
-@dataclass(frozen=True, eq=False)
-class Sampler:
-    """CESTAC runs in which only some encoders are coarse."""
-
-    model: GeneratedModel
-    records: tuple[Record, ...]
-    parts: tuple[Perturbation, ...]
-    settings: CestacSettings
-    estimate: EstimateSettings
-    constants: Mapping[str, float]
-    reference: Estimate
-
-    def confirmed(self, found: EncoderAdvice, encoders: Sequence[int]) -> EncoderAdvice:
-        """The advice with runs at the steps of its limits; of all encoders, also between and above them."""
-        made = {limit.delta: self.level(limit.delta, encoders) for limit in found.limits if np.isfinite(limit.delta)}
-        limits = []
-        for limit in found.limits:
-            if limit.delta not in made:
-                limits.append(limit)
-                continue
-            here, i = made[limit.delta], self.reference.names.index(limit.parameter)
-            limits.append(replace(limit, sampled=here, error=abs(float(here.change[i])), half_width=float(here.half_width[i])))
-        if found.label == ALL and made:
-            low, high = min(made), max(made)
-            for delta in (np.sqrt(low * high), 2 * high, 5 * high):
-                made[float(delta)] = self.level(float(delta), encoders)
-        return replace(found, limits=tuple(limits), sampled=tuple(made[delta] for delta in sorted(made)))
-
-    def level(self, delta: float, encoders: Sequence[int], runs: int | None = None) -> Sampled:
-        """`runs` estimates at one step; default: as many as the settings say."""
-        runs = runs or self.settings.runs
-        return sampled(delta, np.array([self._estimate(delta, encoders, run) for run in range(runs)]), self.reference.X)
-
-    def _estimate(self, delta: float, encoders: Sequence[int], run: int) -> Array:
-        """X_CESTAC, eq. (17)."""
-        observations = [self._observed(k, delta, encoders, run) for k in range(len(self.records))]
-        return linear_system(observations[0] if len(observations) == 1 else stack(observations), self.estimate).solve().X
-
-    def _observed(self, k: int, delta: float, encoders: Sequence[int], run: int) -> Observation:
-        """Record k with the chosen encoders rounded."""
-        record, part = self.records[k], self.parts[k]
-        own = np.linalg.solve(part.root, record.q.T).T  # positions as the encoders see them, up to their offsets
-        error = np.zeros_like(own)
-        for i in encoders:
-            error[:, i] = rounded(own[:, i], delta, self.settings.rounding, stream(self.settings.seed, k, run, i)) - own[:, i]
-        states = filtered_states(record.q + error @ part.root.T, record.rate, part.selection.signals)
-        return observation_from_states(
-            self.model, states, part.torque, part.selection, columns=self.reference.names, constants=self.constants
-        )
 
 
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:

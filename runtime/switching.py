@@ -63,20 +63,27 @@ class Switch:
 
 @dataclass(frozen=True, eq=False)
 class Switched:
-    """A switch under noise of one deviation.
+    """A switch under noise of deviation sigma.
 
     shift : ndarray, shape (K,), E f - f after decimation.   slope : ndarray, shape (K,), c_1/sigma at the kept instants.
     variance : sum of Var f after decimation over the rows used of each joint, shape (n,).   All for G_j = 1.
     """
 
+    sigma: float
     shift: Array
     slope: Array
     variance: Array
 
-    def between(self, other: Switched, share: float) -> Switched:
-        """Linear interpolation, `share` of the other."""
-        pairs = ((self.shift, other.shift), (self.slope, other.slope), (self.variance, other.variance))
-        return Switched(*((1 - share) * a + share * b for a, b in pairs))
+    def between(self, other: Switched, sigma: float) -> Switched:
+        """At a deviation between those of two: shift, slope*sigma and variance/sigma are interpolated linearly.
+
+        Exact where the speed rests (slope as 1/sigma, variance as sigma) and where it passes zero quickly (slope constant, variance as sigma^2).
+        """
+        share = (sigma - self.sigma) / (other.sigma - self.sigma)
+        here = (self.shift, self.slope * self.sigma, self.variance / self.sigma)
+        there = (other.shift, other.slope * other.sigma, other.variance / other.sigma)
+        shift, slope, variance = ((1 - share) * a + share * b for a, b in zip(here, there, strict=True))
+        return Switched(sigma, shift, slope / sigma, variance * sigma)
 
 
 def switches(model: GeneratedModel, names: Sequence[str]) -> tuple[Switch, ...]:
@@ -133,7 +140,7 @@ def switched(
     for j in joints:
         alike = [i for i in joints if i < j and np.array_equal(used[i], used[j])]
         variance[j] = variance[alike[0]] if alike else _summed_variance(coefficients * used[j][near], near, known) / factor
-    return Switched(decimated_shift, decimated_slope / gain, variance)
+    return Switched(sigma, decimated_shift, decimated_slope / gain, variance)
 
 
 def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) -> Array:

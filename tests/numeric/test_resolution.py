@@ -227,3 +227,19 @@ def test_where_a_curve_crosses():
     assert np.isnan(crossing(delta, 0.001 * delta, 1.0)) and np.isnan(crossing(delta, 2 * delta, 1.0))
     found = sampled(1.0, np.array([[1.0], [3.0]]), np.array([4.0]))
     assert np.isclose(found.change[0], -50) and np.isclose(found.half_width[0], 100 * 12.706204736 * np.sqrt(2) / np.sqrt(2) / 4)
+
+
+def test_weights_low_speed_and_several_records(emps):
+    """Rows of slow motion left out: what is left of the record has no sign to flip; two records add up; weights of one joint change nothing."""
+    model, study, record = emps
+    fast = replace(study, rows=replace(study.rows, low_speed=0.02))
+    columns = ("M1R", "FV1", "FS1", "OFFSET1")
+    one = advise(model, record, replace(fast, cestac=replace(fast.cestac, runs=30)), columns=columns)
+    first = one.encoders[0]
+    for point in first.sampled:
+        at = np.array([np.interp(np.log(point.delta), np.log(first.delta), change) for change in first.change.T])
+        assert np.all(np.abs(point.change - at) < 1.3 * point.half_width + AGREED * np.abs(at))
+    both = advise(model, [record, record], fast, columns=columns, confirm=False)
+    weighted = advise(model, record, replace(fast, estimate=replace(fast.estimate, method="wls")), columns=columns, confirm=False)
+    for other in (both, weighted):
+        assert np.allclose(other.encoders[0].change, first.change, rtol=1e-6, atol=1e-9)
