@@ -16,7 +16,7 @@ import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.physical import INERTIAL, PhysicalModel
-from runtime.studies.consistency import Distance, Found, Reference, Rows, closest, margin, solutions
+from runtime.studies.consistency import FURTHEST, Distance, Found, Reference, Rows, closest, margin, solutions
 
 Array = np.ndarray
 Interval = tuple[float | None, float | None]
@@ -68,7 +68,8 @@ class Feasibility:
     def text(self) -> str:
         """One sentence."""
         if self.feasible:
-            return f"physically feasible: every condition holds with a margin of {self.margin:.3g}"
+            least = "at least " if self.margin > 0.999 * FURTHEST else ""
+            return f"physically feasible: every condition holds with a margin of {least}{self.margin:.3g}"
         named = ", ".join(f"{name} (margin {t:.3g})" for name, t in self.blocking)
         return f"NOT physically feasible: no positive mass density and friction gives these parameters; in the way: {named}"
 

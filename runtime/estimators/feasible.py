@@ -13,6 +13,7 @@ options (all of `runtime.feasibility.Limits` too):
     weight     of D, a number; "auto": the largest, to half a decade, that raises the residual norm by at most 1 %; "held-out": that by which
                the two halves of the record in time predict each other best
     bootstrap  resampled records (blocks of time) behind `sigma_corrected`, 0 for none; seed
+    linear     options of the least squares behind it: rank_tolerance, block
 
 sigma and covariance are those of least squares without conditions, eq. (10): the theory of estimates on the boundary of a cone has no such
 formula. `sigma_corrected` is the scatter of the bootstrap, conditions included. A parameter held by an active condition is told by `details`.

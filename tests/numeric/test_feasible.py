@@ -285,6 +285,27 @@ def test_without_the_extra_one_line_says_so(arm, monkeypatch) -> None:
         estimate(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
 
 
+def test_a_solver_that_fails_is_told(arm, monkeypatch) -> None:
+    import cvxpy
+
+    def fails(self, **settings):
+        raise cvxpy.error.SolverError("no")
+
+    monkeypatch.setattr(cvxpy.Problem, "solve", fails)
+    with pytest.raises(InputError, match=r"was not solved \(Clarabel failed\); try another margin"):
+        estimate(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
+
+
+def test_essential_columns_alone_leave_the_others_free(arm) -> None:
+    """With five columns the arm of the estimate has those five parameters and whatever else makes it an arm."""
+    seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.1)
+    names = ("ZZ1R", "MX1R", "FV1", "ZZ2", "MX2")
+    found = estimate(seen, replace(FEASIBLE, columns=names), model=arm)
+    assert found.names == names and min(found.details["smallest_eigenvalues"].values()) > 0
+    chi = np.array(list(found.details["standard"].values()))
+    np.testing.assert_allclose(physical_model(arm).rows(names) @ chi, found.X, atol=1e-10)
+
+
 def test_tx40_record(tx40, tx40_data) -> None:
     """Least squares of the public record is infeasible; the feasible estimate costs less than 5 % (measured 0.24 %), and a robot has its torques."""
     study = study_from_mapping(dataset_study("tx40"))
