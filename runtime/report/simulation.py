@@ -34,6 +34,6 @@ def simulation_figure(joints: Sequence[int], found: Simulation, units: Sequence[
 
 
 def _lines(ax: Any, t: Any, label: str, *lines: tuple[Any, str, str]) -> None:
-    for x, color, name in lines:
-        ax.plot(t, x, linewidth=0.9, color=color, label=name)
+    for x, color, name in lines:  # the first of two is seen behind the second
+        ax.plot(t, x, linewidth=2.4 if color == GREY else 0.9, color=color, label=name)
     ax.set_ylabel(label, fontsize=8)
