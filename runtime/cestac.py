@@ -91,6 +91,8 @@ def cestac(
         )
     if device is not None and (workers or scheduler):
         raise InputError("a device works in this process; leave out workers and scheduler")
+    if scheduler and workers:
+        raise InputError("a scheduler has workers of its own; leave out workers")
     names = _columns(model, records, study, columns, constants)
     task = Task(
         parts=tuple(_part(record, study) for record in records),

@@ -53,10 +53,13 @@ def fleet(
 
 def finished(jobs: Sequence[Job], output: Path | None, workers: int, scheduler: str | None) -> Iterator[Done]:
     """Results as they come; the records of some jobs are read, sent and worked on, then those of the next."""
+    from runtime.errors import InputError
     from runtime.processes import results
     from runtime.studies import distributed
     from symgen.cli.fleet_jobs import Done, Packer, Parcel, identified
 
+    if scheduler and workers:
+        raise InputError("a scheduler has workers of its own; leave out --workers")
     packed = Packer(output)
     for start in range(0, len(jobs), WAVE):
         parcels: list[Parcel] = []

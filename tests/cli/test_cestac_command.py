@@ -115,3 +115,5 @@ def test_many_runs_stay_in_their_archives(tmp_path, emps_data):
 def test_scheduler_that_does_not_answer(emps_data):
     result = run("emps", "emps", "--scheduler", "tcp://nowhere")
     assert result.exit_code == 2 and "no answer from the scheduler tcp://nowhere" in result.stderr
+    result = run("emps", "emps", "--scheduler", "tcp://nowhere", "--workers", 2)
+    assert result.exit_code == 2 and "workers of its own" in result.stderr
