@@ -2,11 +2,22 @@
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from runtime.decimation import decimate, plan
 from runtime.errors import InputError
 from runtime.signals import butterworth, derivative, lowpass_filtered, median_filtered
-from runtime.stages import Chain, Local, StreamedDecimation, ZeroPhase, derivative_stage, median_stage, position_stage, velocity_stage
+from runtime.stages import (
+    TRUNCATION,
+    Chain,
+    Local,
+    StreamedDecimation,
+    ZeroPhase,
+    derivative_stage,
+    median_stage,
+    position_stage,
+    velocity_stage,
+)
 from runtime.study import Lowpass, Signals
 
 
@@ -42,6 +53,15 @@ def test_lowpass(N, size, padding):
     x = walk(N, 2)
     found, whole = through(ZeroPhase(*butterworth(1000.0, low)), x, size), lowpass_filtered(x, 1000.0, low)
     np.testing.assert_allclose(found, whole, rtol=0, atol=1e-14 * np.abs(x).max())
+
+
+@pytest.mark.parametrize("order", [1, 2, 4, 7, 12])
+@pytest.mark.parametrize("cutoff", [0.5, 20.0, 480.0])
+def test_what_truncation_leaves_out(order, cutoff):
+    """The backward filter forgets the state it starts in, steady for the value 1, to less than ten times the stated bound."""
+    stage = ZeroPhase(*butterworth(1000.0, Lowpass(cutoff=cutoff, order=order)))
+    left, _ = scipy.signal.sosfilt(stage.sos, np.zeros(stage.ahead), zi=stage.zi[..., 0])
+    assert abs(left[-1]) < 10 * TRUNCATION
 
 
 def test_lowpass_does_not_hold_the_record():
