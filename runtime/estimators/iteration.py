@@ -32,13 +32,14 @@ SLOW = 0.9  # contraction above which the fixed point is hardly one
 class Options:
     """estimate.options of iv and didim.
 
-    start : X^0: "ols", "values" of the robot file, or "unit" (motor inertia, else inertia or mass of the own link, 1 for every joint; rest 0).
-    gains : X_ref of g: "ols", "values", or "one" (no rescaling).   passes : largest number with rescaled gains, and with g = 1.
+    start : X^0: "ols", "values" of the robot file, "unit" (motor inertia, else inertia or mass of the own link, 1 for every joint; rest 0), or
+        parameters by name, the others 0.
+    gains : X_ref of g: "ols", "values", "start", or "one" (no rescaling).   passes : largest number with rescaled gains, and with g = 1.
     change, residual : the stop.   reference : "known", or "measured" where the reference has to be inferred (`runtime.closed_loop`).
     """
 
-    start: Literal["ols", "values", "unit"] = "ols"
-    gains: Literal["ols", "values", "one"] = "ols"
+    start: Literal["ols", "values", "unit"] | Mapping[str, float] = "ols"
+    gains: Literal["ols", "values", "start", "one"] = "ols"
     passes: int = 15
     change: float = 0.1
     residual: float = 1e-3
@@ -94,9 +95,13 @@ def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
     return np.array([by_name.get(name, 0.0) for name in every])
 
 
-def initial(loop: ClosedLoop, seen: Observation, which: str) -> Array:
-    """X of the columns by ordinary least squares, from the robot file, or of unit inertia."""
+def initial(loop: ClosedLoop, seen: Observation, which: str | Mapping[str, float]) -> Array:
+    """X of the columns by ordinary least squares, from the robot file, of unit inertia, or as given."""
     names = seen.names
+    if not isinstance(which, str):
+        if unknown := [name for name in which if name not in names]:
+            raise SettingsError(f"no parameter {', '.join(unknown)}; there are {', '.join(names)}", path=("estimate", "options", "start"))
+        return np.array([which.get(name, 0.0) for name in names])
     if which == "ols":
         return ols.system(seen, EstimateSettings()).solve().X
     model: Any = loop.model
@@ -124,7 +129,8 @@ def iterate(loop: ClosedLoop, seen: Observation, options: Options, update: Calla
     """The fixed point of X -> update(simulation with X, X), X of the columns of `seen`."""
     names, every = seen.names, loop.model.BASE_PARAMETERS
     X = initial(loop, seen, options.start)
-    J = None if options.gains == "one" else loop.inertia(full(names, initial(loop, seen, options.gains), every))
+    reference = X if options.gains in ("start", "one") else initial(loop, seen, options.gains)
+    J = None if options.gains == "one" else loop.inertia(full(names, reference, every))
     trail: list[dict[str, Any]] = []
     step: Step | None = None
     changes: list[float] = []
