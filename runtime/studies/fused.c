@@ -150,7 +150,7 @@ struct kernels {
 #include "fused.c"
 #define NAME(x) x##_avx512
 #define TARGET __attribute__((target("avx512f")))
-#define TOGETHER 6
+#define TOGETHER 8
 #define WIDTH 8
 #include "fused.c"
 #endif
