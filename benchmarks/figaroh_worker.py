@@ -1,6 +1,6 @@
 """The identification of a serial robot by figaroh, run by the Python that has figaroh; started by figaroh_job.py.
 
-One JSON line with settings on standard input; then for every line `run` the job is done once and a JSON line with its CPU seconds is written. The
+One JSON line with settings on standard input; then for every line `run` the job is done once and a JSON line with its CPU seconds, and those of reading the files, is written. The
 line `result` writes what the last run found. figaroh's own steps are used as they are: median, filter, differentiation, regressor, decimation, base
 parameters by QR, least squares, relative deviations. Only what figaroh asks its users for is written here: reading the files, the drives, and the
 three columns of the coupled wrist. Its validation is left out, which evaluates the regressor a second time.
@@ -61,8 +61,10 @@ class Identification(BaseIdentification):
         }
 
     def load_trajectory_data(self, data_source=None):
+        start = time.process_time()
         q, tau = (pandas.read_csv(file).to_numpy() for file in self.settings["files"])
         ratio = np.array(self.settings["ratio"])
+        self.reading = time.process_time() - start
         return {
             "timestamps": np.arange(len(q))[:, None] / self.settings["filter"]["f_sample"],
             "positions": q @ np.linalg.inv(ratio).T + self.settings["offset"],
@@ -115,7 +117,7 @@ def main():
             start = time.process_time()
             with contextlib.redirect_stdout(io.StringIO()):  # figaroh prints a report
                 found = job(robot, settings)
-            answer = {"seconds": time.process_time() - start}
+            answer = {"seconds": time.process_time() - start, "reading": found.reading}
         print(json.dumps(answer), file=out, flush=True)
 
 
