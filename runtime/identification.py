@@ -95,6 +95,16 @@ class Identification:
         return max(errors, default=float("nan"))
 
     @property
+    def shown_rows(self) -> int:
+        """Rows of the comparison, which stands for the first instants of records that were read by blocks."""
+        return sum(len(joint.t) for joint in self.comparison)
+
+    @property
+    def in_part(self) -> bool:
+        """Whether the comparison leaves rows out."""
+        return self.shown_rows < self.every.rows
+
+    @property
     def verdict(self) -> str:
         """One sentence."""
         if self.every.status == "rank-deficient":

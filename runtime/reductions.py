@@ -4,6 +4,7 @@
     triangular_factor(model, q, qd, qdd, tau)      the structured factor of [W Y], from which every estimate is read
     joint_columns(model)                           C_j: the columns that act on joint j, from STRUCTURE
 
+Which entries of the regressor are signals of their own is told by `runtime.columns.distinct_entries`, their values by `runtime.columns.signals_of`.
 A block of rows of joint j is [W_j[:, C_j] Y_j]', shape (|C_j| + 1, B): structural zeros are never multiplied. These take every sample as it is;
 records with filters, decimation and rows left out are reduced by `runtime.streaming`.
 """

@@ -56,7 +56,12 @@ def torque_section(found: Identification) -> Section:
         )
         for joint in found.comparison
     ]
-    return Section(f"{found.source.capitalize()} and predicted torques", images=images)
+    text = (
+        [f"Read by blocks: figures show the first {found.shown_rows} of {found.every.rows} rows, tables count all."]
+        if found.in_part
+        else []
+    )
+    return Section(f"{found.source.capitalize()} and predicted torques", text, images)
 
 
 def joint_section(found: Identification) -> Section:

@@ -174,3 +174,9 @@ def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
     (tmp_path / "study.yaml").write_text("record: {files: axis.npz}\nstream: off\n")
     assert "stream" not in json.loads(run("emps", tmp_path / "study.yaml", "--json").stdout)["settings"]
     assert run("emps", tmp_path / "study.yaml", "--block", "3").exit_code == 2
+
+
+def test_report_says_what_its_figures_leave_out(tx40_data, tmp_path, monkeypatch):
+    monkeypatch.setattr("runtime.streaming.SHOWN", 300)
+    assert run("tx40", "tx40", "--block", 20000, "-o", tmp_path).exit_code == 0
+    assert "figures show the first 1782 of 5592 rows" in (tmp_path / "report.html").read_text(encoding="utf-8")  # 6 (300 - 3), 6 (938 - 6)
