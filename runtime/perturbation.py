@@ -65,13 +65,14 @@ class Perturbation:
     errors : by encoder, ndarray, shape (n, b, b), E[dW_j'dW_j] alone.
     speeds : by encoder, ndarray, shape (n, b, K): sensitivity of the rows to dqd of that encoder, times the root of its variance.
     root : ndarray, shape (n, encoders), joint position error per encoder error.
+    along : s = G qd over the window, shape (N,), by column that switches.
     used : bool, shape (n, N), instants of the window nearest to a row that is used.   known : switches computed so far.
     """
 
     seen: Observation
     torque: Array
     selection: Selection
-    qd: Array
+    along: Mapping[int, Array]
     band: Bandwidth
     root: Array
     clean: Normal
@@ -137,7 +138,9 @@ class Perturbation:
         key = (switch.column, node)
         if key not in self.known:
             factor, settings = self.selection.factor, self.selection.signals.decimate
-            self.known[key] = switched(switch, self.qd, NODE**node, self.band.gain, self.kernels, factor, settings, self.used)
+            self.known[key] = switched(
+                switch, self.along[switch.column], NODE**node, self.band.gain, self.kernels, factor, settings, self.used
+            )
         return self.known[key]
 
 
@@ -178,7 +181,7 @@ def perturbation(
         seen=seen,
         torque=torque,
         selection=selection,
-        qd=window.qd,
+        along={switch.column: window.qd @ switch.G for switch in found},
         band=band,
         root=root,
         clean=_normal([seen.W[seen.joint(j)] for j in range(seen.n)], [seen.Y[seen.joint(j)] for j in range(seen.n)]),

@@ -119,18 +119,17 @@ def _shape(kind: str, direction: str) -> tuple[float, float, float] | None:
 
 
 def switched(
-    switch: Switch, qd: Array, sigma: float, gain: float, known: Kernels, factor: int, settings: Decimate | None, used: Array
+    switch: Switch, s: Array, sigma: float, gain: float, known: Kernels, factor: int, settings: Decimate | None, used: Array
 ) -> Switched:
     """The switch with an error of s of deviation `sigma`.
 
-    qd : ndarray, shape (N, n), filtered velocities of the window.   factor, settings : decimation.
+    s : ndarray, shape (N,), G qd of the filtered velocities of the window.   factor, settings : decimation.
     used : bool, shape (n, N): instants that count in the rows of joint j.
     """
-    s = qd @ switch.G
-    near = np.flatnonzero((np.abs(s) < FAR * sigma) | (switch.kink != 0))
+    near = np.arange(len(s)) if switch.kink else np.flatnonzero(np.abs(s) < FAR * sigma)
     u = s[near] / sigma
     m, phi = erf(u / np.sqrt(2)), np.exp(-(u**2) / 2) / np.sqrt(2 * np.pi)
-    shift, slope = np.zeros(len(s)), switch.linear + switch.kink * np.sign(s)
+    shift, slope = np.zeros(len(s)), np.full(len(s), switch.linear)  # away from `near`, and a kink has no away
     shift[near] = switch.jump * (m - np.sign(u)) + switch.kink * sigma * (u * m + 2 * phi - np.abs(u))
     slope[near] = switch.linear + switch.jump * 2 * phi / sigma + switch.kink * m
     decimated_shift, decimated_slope = decimated(np.array([shift, slope]), factor, settings)

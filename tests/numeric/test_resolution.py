@@ -97,7 +97,7 @@ def test_a_switch_under_noise_against_sampling(half):
     delta = 2e-4
     sigma = delta * np.sqrt(band.before[1, 1])
     switch = Switch(0, np.ones(1), 0.5, 0.0, 0.5) if half else Switch(0, np.ones(1), 0.0, 1.0, 0.0)
-    found = switched(switch, s[:, None], sigma, band.gain, kernels(band, N, factor), factor, signals.decimate, np.ones((1, N), dtype=bool))
+    found = switched(switch, s, sigma, band.gain, kernels(band, N, factor), factor, signals.decimate, np.ones((1, N), dtype=bool))
 
     def f(v):
         return np.maximum(v, 0) if half else np.sign(v)
