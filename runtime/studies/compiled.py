@@ -27,6 +27,7 @@ Array = np.ndarray
 
 ABI = 2
 TOLERANCE = 1e-10  # of the largest entry: the self-check looks for wrong code, not for rounding
+SHARE = 32 << 20  # bytes of the last cache that one core may count on at most
 STATES = {
     "regressor": ("q", "qd", "qdd"),
     "inverse_dynamics": ("q", "qd", "qdd"),
@@ -96,7 +97,7 @@ class CompiledModel:
         self._model, self._library, self.source = model, library, source
         self.signals = _signals(library, model)
         self._n, self._b = len(model.JOINTS), len(model.BASE_PARAMETERS)
-        self._third = _third_of_last_cache()
+        self._large = _large()
 
     def __getattr__(self, name: str) -> Any:
         if name == "_model":  # while it is being copied
@@ -190,7 +191,7 @@ class CompiledModel:
         values = np.array([float({**self._model.CONSTANTS, **constants}[c]) for c in self._model.CONSTANTS] or [0.0])
         if not (result.flags.c_contiguous and result.flags.aligned and result.flags.writeable and result.dtype == np.float64):
             raise InputError(f"{self._model.NAME}: the store is not a writeable float64 array in C order")
-        stream = result.nbytes > self._third
+        stream = result.nbytes > self._large
         pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*inputs, values, result)]
         status = getattr(self._library, f"{self._model.NAME}_{name}")(ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream))
         if status:
@@ -208,13 +209,13 @@ def _signals(library: ctypes.CDLL, model: GeneratedModel) -> Signals:
     return Signals(cast(int, address), count, tile, column, row, signal, sign, constant)
 
 
-def _third_of_last_cache() -> int:
-    """Bytes beyond which a result should not pass through the caches."""
+def _large() -> int:
+    """Bytes beyond which a result should not pass through the caches: a third of the last one, of which a large one is shared by many cores."""
     try:
         size = os.sysconf("SC_LEVEL3_CACHE_SIZE")
     except (AttributeError, ValueError, OSError):
         size = 0
-    return (size if size > 0 else 32 << 20) // 3
+    return min(size if size > 0 else SHARE, SHARE) // 3
 
 
 def _beside(model: GeneratedModel) -> Path:

@@ -93,7 +93,7 @@ def c_spec(spec: ModuleSpec) -> CSpec:
     kernels.append(_torques(regrouping, "bias", *torque_graph(regrouping, acceleration=False)))
     kernels.append(_torques(regrouping, "gravity", *torque_graph(regrouping, acceleration=False, velocity=False)))
     most = max(kernel.computed + kernel.crossing for kernel in kernels)
-    tile = next((B for B in (64, 32, 16) if 8 * B * most <= SCRATCH), 8)
+    tile = 16 if 8 * 16 * most <= SCRATCH else 8  # the rows of a short tile stay in the first cache
     return CSpec(robot, tuple(_header(spec)), tuple(kernels), tile, n)
 
 

@@ -169,7 +169,7 @@ def test_signals(tmp_path: Path) -> None:
 def test_large_results_are_streamed(model: GeneratedModel, warm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     c, given = in_c(model, warm), states(203)
     ordinary = c.regressor(*given).copy()
-    monkeypatch.setattr(c, "_third", 0)
+    monkeypatch.setattr(c, "_large", 0)
     assert np.array_equal(c.regressor(*given), ordinary)
 
 
