@@ -50,7 +50,7 @@ class Device:
 
     arrays : the array module of the same robot file as the model of the study (`runtime.array_model.load_arrays`).
     like : any array of the package on the device to be used.
-    batch : runs computed at once; a TX40 run of 45000 samples takes about 0.4 GB of device memory.
+    batch : runs computed at once; a TX40 run of 45000 samples takes about 0.12 GB of memory.
     compiled : turns the function of a batch into a faster one, such as jax.jit; batches of one size have the same shapes.
     """
 
