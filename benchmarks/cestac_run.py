@@ -41,6 +41,7 @@ from runtime.drives import Drives
 from runtime.essential import essential
 from runtime.io.datasets import dataset_study
 from runtime.observation import decimated_torque, observe, select_rows
+from runtime.rounding import bits, stream
 from runtime.studies import fused, fused_cestac
 from runtime.studies.compile_cache import FallbackWarning, compiler
 from runtime.studies.compiled import compiled_model
@@ -105,9 +106,13 @@ def stages(task: Task) -> dict[str, Callable[[], object]]:
     arguments = chosen.samples, chosen.factor, chosen.signals.decimate, work.constants, room
     y = fused.decimated(work.entries, states, *arguments)
     rows = fused_cestac.KeptRows(work.entries, [(y, part.torque, chosen.mask)], work.room)
+
+    def draw_and_filter() -> fused.FilteredStates:
+        up = bits(q.shape, stream(task.settings.seed, *KEY))
+        return fused.FilteredStates(q, part.rate, chosen.signals, room, up=up, step=task.levels[0].delta)
+
     return {
-        "  C: perturb": lambda: perturbed_position(q, task.levels[0], task.settings, task.drives, KEY),
-        "  C: filters": lambda: fused.FilteredStates(q, part.rate, chosen.signals, room),
+        "  C: draw, filters": draw_and_filter,
         "  C: signals, decimation": lambda: fused.decimated(work.entries, states, *arguments),
         "  C: least squares": lambda: fused_cestac.least_squares(rows),
     }

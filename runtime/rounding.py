@@ -46,6 +46,10 @@ def noise(shape: tuple[int, ...], mode: Mode, rng: np.random.Generator) -> Array
 
 def signs(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
     """+1.0 or -1.0 with probability 1/2, one random bit each; columns are contiguous, as filters want them."""
+    return np.asarray(2.0 * np.ascontiguousarray(bits(shape, rng).T) - 1.0).T
+
+
+def bits(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
+    """1 or 0 with probability 1/2."""
     size = int(np.prod(shape))
-    bits = np.unpackbits(np.frombuffer(rng.bytes(-(-size // 8)), dtype=np.uint8), count=size).reshape(shape)
-    return np.asarray(2.0 * np.ascontiguousarray(bits.T) - 1.0).T
+    return np.unpackbits(np.frombuffer(rng.bytes(-(-size // 8)), dtype=np.uint8), count=size).reshape(shape)

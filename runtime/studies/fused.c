@@ -53,13 +53,14 @@ struct lowpass {
     const double *sos, *zi;
 };
 
-/* Positions, given[t*sample + j*joint], and filtered positions and velocities, in groups of LANES joints: (groups, N + 2 pad, LANES), the N
+/* Positions, given[t*sample + j*joint], moved by +step or -step as up (N, n) says if it is there, and filtered positions and velocities, in groups of LANES joints: (groups, N + 2 pad, LANES), the N
 samples in the middle. pad: the larger one of the two filters. ends: differences there are 1 one-sided, 2 of second order. */
 struct states {
     int64_t N, n, sample, joint, pad, ends;
-    double rate;
+    double rate, step;
     struct lowpass on_q, on_qd;
     const double *given;
+    const uint8_t *up;
     double *q, *qd;
 };
 
@@ -90,7 +91,7 @@ struct decimation {
 
 /* Entries of the n joints: those of joint j are from[j] .. from[j + 1] - 1, c of them; its torque stands behind the last one.
 
-A: width^2 numbers a joint, width being c + 1 rounded up to SIDE, lower tiles. g: width numbers a joint, g[c] the square of the residual. O: scratch, rows of
+A: width^2 numbers a joint, width being c + 1 rounded up to SIDE. g: width numbers a joint, g[c] the square of the residual. O: scratch, rows of
 SPAN + LANES numbers, as many as the largest width. R: (c + 1, c + 1 + most) a joint, of which rows for a QR fill taken[j] <= most columns
 behind the first c + 1.
 */
@@ -246,6 +247,9 @@ int32_t fused_states(const struct states *a)
         for (int64_t t = 0; t < N; t++)
             for (int64_t l = 0; l < LANES; l++)
                 x[t*LANES + l] = l < used ? a->given[t*a->sample + (j + l)*a->joint] : 0.0;
+        for (int64_t t = 0; t < N && a->up; t++)
+            for (int64_t l = 0; l < used; l++)
+                x[t*LANES + l] += a->step*(2*a->up[t*n + j + l] - 1); /* no branch: its outcome is random */
         if (a->on_q.sections)
             zero_phase(x, N, &a->on_q);
         difference(x, dx, N, a->rate, a->ends);
@@ -542,7 +546,7 @@ TARGET INLINE double NAME(total)(const NAME(V) *sum)
     return all;
 }
 
-/* A += O O' in tiles of SIDE, those on and below the diagonal; samples in whole vectors. */
+/* A += O O' in tiles of SIDE, those below the diagonal for both sides; samples in whole vectors. */
 TARGET static void NAME(gram)(const double *O, int64_t width, int64_t samples, double *A)
 {
     for (int64_t i = 0; i < width; i += SIDE)
@@ -555,8 +559,13 @@ TARGET static void NAME(gram)(const double *O, int64_t width, int64_t samples, d
                     for (int r = 0; r < SIDE; r++)
                         sum[SIDE*p + r] += o*FROM(O + (k + r)*APART + t);
                 }
-            for (int p = 0; p < SIDE*SIDE; p++)
-                A[(i + p/SIDE)*width + k + p%SIDE] += NAME(total)(sum + p);
+            for (int p = 0; p < SIDE*SIDE; p++) {
+                const int64_t row = i + p/SIDE, column = k + p%SIDE;
+                const double all = NAME(total)(sum + p);
+                A[row*width + column] += all;
+                if (k < i)
+                    A[column*width + row] += all;
+            }
         }
 }
 

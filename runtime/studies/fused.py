@@ -56,9 +56,10 @@ class StatesStructure(ctypes.Structure):
     _fields_ = [
         *_fields("N n sample joint pad ends"),
         ("rate", ctypes.c_double),
+        ("step", ctypes.c_double),
         ("on_q", LowpassStructure),
         ("on_qd", LowpassStructure),
-        *_fields(pointers="given q qd"),
+        *_fields(pointers="given up q qd"),
     ]
 
 
@@ -155,9 +156,12 @@ def _lowpass(low: Lowpass | None, name: str, rate: float) -> tuple[LowpassStruct
 
 
 class FilteredStates:
-    """q, qd, qdd of measured positions q, shape (N, n): median, low-pass, difference, low-pass, difference. As C keeps them, in `room`."""
+    """q, qd, qdd of measured positions q, shape (N, n): median, low-pass, difference, low-pass, difference. As C keeps them, in `room`.
 
-    def __init__(self, q: Array, rate: float, signals: SignalSettings, room: Room) -> None:
+    up, step : moves q before all filters but the median by +step where `up`, uint8 of shape (N, n), is 1, and by -step where it is 0.
+    """
+
+    def __init__(self, q: Array, rate: float, signals: SignalSettings, room: Room, *, up: Array | None = None, step: float = 0.0) -> None:
         given = np.asarray(median_filtered(q, signals.median), dtype=float)
         self.N, self.n = given.shape
         (on_q, *_), (on_qd, *_) = (_lowpass(signals.lowpass, name, rate) for name in ("q", "qd"))
@@ -166,8 +170,8 @@ class FilteredStates:
         groups = -(-self.n // LANES)
         lanes = room.array("lanes", 2, groups, self.N + 2 * pad, LANES)
         steps = [step // given.itemsize for step in given.strides]
-        pointers = address(given), address(lanes[0]), address(lanes[1])
-        self.lanes, self.structure = lanes, StatesStructure(self.N, self.n, *steps, pad, ends, rate, on_q, on_qd, *pointers)
+        pointers = address(given), None if up is None else address(up), address(lanes[0]), address(lanes[1])
+        self.lanes, self.structure = lanes, StatesStructure(self.N, self.n, *steps, pad, ends, rate, step, on_q, on_qd, *pointers)
         call("states", ctypes.byref(self.structure))
 
     def rows(self, samples: slice) -> Array:

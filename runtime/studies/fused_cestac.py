@@ -24,6 +24,7 @@ from runtime.estimators.normal import LeastSquares
 from runtime.model import GeneratedModel
 from runtime.model_text import ModelText
 from runtime.observation import decimated_torque
+from runtime.rounding import bits, stream
 from runtime.runs import TRIANGULAR, Run, Runs
 from runtime.studies import fused
 from runtime.studies.compile_cache import FallbackWarning
@@ -86,6 +87,7 @@ class FusedWorkspace:
         self.constants = fused.constant_values(model, task.constants)
         self.room = fused.Room()
         self.parts = [(part, np.asfortranarray(part.q), fused.Room()) for part in task.parts]
+        self.two_point = task.settings.rounding == "two-point" and (task.settings.side == "joint" or task.drives is None)
 
     def run(self, key: tuple[int, int]) -> Run:
         """One estimate from perturbed measurements."""
@@ -104,7 +106,7 @@ class FusedWorkspace:
         rows = []
         for k, (part, q, room) in enumerate(self.parts):
             position_key, torque_key = part_key(draw, k)
-            y = self._signals(part, perturbed_position(q, level, self.task.settings, self.task.drives, position_key), room)
+            y = self._signals(part, q, level, position_key, room)
             torque = part.torque
             if level.torque:
                 tau = perturbed_torque(part.tau, level, self.task.settings, self.task.drives, torque_key)
@@ -112,10 +114,14 @@ class FusedWorkspace:
             rows.append((y, torque, part.selection.mask))
         return least_squares(KeptRows(self.entries, rows, self.room))
 
-    def _signals(self, part: Part, q: Array, room: fused.Room) -> Array:
+    def _signals(self, part: Part, q: Array, level: Level, key: tuple[int, ...], room: fused.Room) -> Array:
         """Distinct signals of the wanted columns at the kept samples, shape (S, K)."""
-        chosen = part.selection
-        states = fused.FilteredStates(q, part.rate, chosen.signals, room)
+        settings, chosen = self.task.settings, part.selection
+        if self.two_point and level.delta and chosen.signals.median == 1:  # the sum is left to C
+            up = bits(q.shape, stream(settings.seed, *key))
+            states = fused.FilteredStates(q, part.rate, chosen.signals, room, up=up, step=level.delta)
+        else:
+            states = fused.FilteredStates(perturbed_position(q, level, settings, self.task.drives, key), part.rate, chosen.signals, room)
         y = fused.decimated(self.entries, states, chosen.samples, chosen.factor, chosen.signals.decimate, self.constants, room)
         if not np.isfinite(y).all():
             raise InputError(f"the regressor of {self.model.NAME} is not finite at perturbed positions; use smaller steps")

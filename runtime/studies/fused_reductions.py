@@ -102,8 +102,7 @@ class CRows(ABC):
         self.passed(NORMAL, self._structure(A=A), None)
         grams, end = [], 0
         for width, count in zip(self.widths, self.counts, strict=True):
-            lower = np.tril(A[end : end + width * width].reshape(width, width)[:count, :count])
-            grams.append(lower + np.tril(lower, -1).T)
+            grams.append(A[end : end + width * width].reshape(width, width)[:count, :count].copy())
             end += width * width
         return Normal(self.entries.columns, tuple(grams), len(self.entries.names))
 

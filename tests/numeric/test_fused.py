@@ -81,6 +81,13 @@ def test_states_are_those_of_scipy(n, N, signals, order):
         np.testing.assert_array_equal(found.rows(slice(7, 13)), found.rows(slice(0, N))[..., 7:13])
 
 
+def test_positions_moved_by_one_step():
+    q, up = walk(200, 3), np.random.default_rng(1).integers(0, 2, (200, 3), dtype=np.uint8)
+    found = FilteredStates(q, RATE, Signals(median=1), Room(), up=up, step=1e-3).rows(slice(0, 200))
+    right = FilteredStates(q + 1e-3 * (2.0 * up - 1), RATE, Signals(median=1), Room()).rows(slice(0, 200))
+    np.testing.assert_array_equal(found, right)
+
+
 def store(entries: Entries, y: Array) -> Array:
     """Rows of signals as columns by joints, shape (b, n, K)."""
     filled = np.zeros((len(entries.names), entries.n, y.shape[1]))
@@ -311,7 +318,7 @@ int main(void)
     enum { N = 203, n = 9, L = 24, blocks = 5, S = 7, T = 16, K = 5*3 + 2, PAD = 12 };
     double sos[12] = {0.1, 0.2, 0.1, 1, -0.4, 0.1, 1, 2, 1, 1, -0.5, 0.2}, zi[4] = {0.2, -0.1, 0.3, 0.1};
     struct lowpass low = {2, PAD, sos, zi};
-    struct states states = {N, n, n, 1, PAD, 1, 100.0, low, low, array(N*n, 1), array(2*(N + 2*PAD)*LANES, 0), array(2*(N + 2*PAD)*LANES, 0)};
+    struct states states = {N, n, n, 1, PAD, 1, 100.0, 0.01, low, low, array(N*n, 1), calloc(N*n, 1), array(2*(N + 2*PAD)*LANES, 0), array(2*(N + 2*PAD)*LANES, 0)};
     int32_t bad = fused_states(&states);
     double *q = array(n*N, 0), *qd = array(n*N, 0), *qdd = array(n*N, 0);
     bad |= fused_gather(&states, 0, N, q, qd, qdd, N);
