@@ -19,6 +19,7 @@ The ends of a record, where filters reflect it, are left out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil, log2
 
 import numpy as np
 from scipy.signal import butter, cheby1, sosfreqz
@@ -31,7 +32,9 @@ from runtime.study import Signals
 Array = np.ndarray
 
 FREQUENCIES = 2**13
-"""Frequencies from 0 to the Nyquist frequency: impulse responses up to this many samples are exact."""
+"""Frequencies from 0 to the Nyquist frequency, at least: impulse responses up to this many samples are exact."""
+MEMORY = 10
+"""Length of the response of a low-pass, over 1/cut-off: there it has decayed below 1e-9."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +65,9 @@ def bandwidth(signals: Signals, rate: float) -> Bandwidth:
             f"a median over {signals.median} samples is not linear, and no prediction is made through it; use 1 and sample otherwise",
             path=("cestac", "median"),
         )
-    w = np.linspace(0, np.pi, FREQUENCIES + 1)
     low, factor = signals.lowpass, decimation_factor(signals, rate)
+    longest = 0.0 if low is None else MEMORY * rate / low.cutoff
+    w = np.linspace(0, np.pi, max(FREQUENCIES, 2 ** ceil(log2(max(longest, 1)))) + 1)
     H = np.ones_like(w) if low is None else _power(butter(low.order, low.cutoff, fs=rate, output="sos"), w)
     on = () if low is None else low.on
     slope = 1j * rate * np.sin(w)
@@ -83,9 +87,9 @@ def _power(sos: Array, w: Array) -> Array:
 def _covariance(K: Array) -> Array:
     """Mean of K K^* over the circle, shape (3, 3)."""
     ends = K[:, [0, -1]]
-    return np.asarray(((K @ K.conj().T).real - (ends @ ends.conj().T).real / 2) / FREQUENCIES)
+    return np.asarray(((K @ K.conj().T).real - (ends @ ends.conj().T).real / 2) / (K.shape[1] - 1))
 
 
 def _transform(spectrum: Array) -> Array:
-    """Correlation at lags 0 ... FREQUENCIES - 1 of a real, even spectrum."""
-    return np.asarray(np.fft.irfft(spectrum)[:FREQUENCIES])
+    """Correlation at lags from 0 on of a real, even spectrum."""
+    return np.asarray(np.fft.irfft(spectrum)[: len(spectrum) - 1])

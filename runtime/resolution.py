@@ -237,7 +237,7 @@ def assumptions(study: Study, records: Sequence[Record], parts: Sequence[Perturb
 def _refuse(study: Study) -> None:
     if study.estimate.method not in ("ols", "wls"):
         raise SettingsError(
-            f"{study.estimate.method!r}; the prediction is that of ols or wls, sample other methods", path=("estimate", "method")
+            f"{study.estimate.method!r}; the prediction is that of least squares, use ols or wls", path=("estimate", "method")
         )
     if study.estimate.weights == "covariance":
         raise SettingsError("'covariance'; the prediction knows weights by joint, use joint or iterated", path=("estimate", "weights"))

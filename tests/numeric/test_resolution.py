@@ -67,11 +67,12 @@ def emps_advice(emps):
         (Signals(median=1, lowpass=Lowpass(cutoff=50)), 5000.0),
         (Signals(median=1, lowpass=Lowpass(cutoff=100, on=("q",)), decimate=Decimate(factor=10, phase="last", padding="matlab")), 1000.0),
         (Signals(median=1, lowpass=None, decimate=None), 1000.0),
+        (Signals(median=1, lowpass=Lowpass(cutoff=4), decimate=Decimate(factor=40)), 5000.0),  # a response of more than 8192 samples
     ],
 )
 def test_moments_are_those_of_the_filters_as_they_run(signals, rate):
     """One unit error far from the ends: the sum of squares of what it becomes is the variance of what unit white noise becomes."""
-    N = 12001
+    N = 24001
     impulse = np.zeros((N, 1))
     impulse[N // 2] = 1.0
     states = filtered_states(impulse, rate, signals)
