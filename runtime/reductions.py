@@ -23,7 +23,7 @@ from runtime.model import GeneratedModel, check_states
 Array = np.ndarray
 
 BLOCK = 4096  # samples: rows of 32 kB
-KEPT = 256 * 2**20  # bytes of rows kept from the first pass for the second; what exceeds them is evaluated again
+KEPT = 32 * 2**20  # bytes of rows kept from the first pass for the second; more is evaluated again: fresh pages can cost more than that
 
 
 def joint_columns(model: GeneratedModel) -> tuple[Array, ...]:
