@@ -4,7 +4,7 @@
 
 g refers to X_ref, which is not the truth: the last passes need g = 1. A parameter vector whose loop cannot be simulated (inertia not positive
 definite, unstable) is refused: the step towards it is halved, at most five times. Stop: max |dX_i|/sigma_i < 0.1 and the norm of the residual
-changes by less than 1e-3 of itself, or the change is rounding.
+changes by less than 1e-3 of itself, or the change is rounding. Where passes overshoot, the steps that follow are shortened.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ Array = np.ndarray
 
 HALVINGS = 5
 SLOW = 0.9  # contraction above which the fixed point is hardly one
+ROUGH = 10.0  # the stop of passes with rescaled gains, which only lead to the last ones, over that of the last ones
+SWING = 0.7  # contraction above which steps are halved
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ def iterate(loop: ClosedLoop, seen: Observation, options: Options, update: Calla
     trail: list[dict[str, Any]] = []
     step: Step | None = None
     changes: list[float] = []
-    converged, message = False, ""
+    converged, message, share = False, "", 1.0
     for rescaled in (True, False) if J is not None else (False,):
         previous: Step | None = None
         converged = False
@@ -151,12 +153,12 @@ def iterate(loop: ClosedLoop, seen: Observation, options: Options, update: Calla
             trail.append({"X": X, "next": step.X, "norm": step.norm, "g": g, "change": change})
             still = previous is not None and abs(step.norm - previous.norm) <= options.residual * previous.norm
             rounding = bool(np.all(moved <= 1e-9 * np.max(np.abs(step.X))))
-            X, previous = step.X, step
-            if (change < options.change and still) or rounding:
+            if _swings(changes[-3:]):
+                share = max(share / 2, 0.25)
+            X, previous = X + share * (step.X - X), step
+            if (change < options.change * (ROUGH if rescaled else 1) and still) or rounding:
                 converged = True
                 break
-        if not converged:
-            break
     assert step is not None  # options.passes >= 1
     return Fixed(step, tuple(trail), converged, _contraction(changes))
 
@@ -180,6 +182,11 @@ def _simulated(
                 raise
             X = (X + before) / 2
     return X, g, (), f"The simulation cannot be made, also after {HALVINGS} halved steps: {reason}"
+
+
+def _swings(changes: Sequence[float]) -> bool:
+    """Whether three changes hardly shrink: the passes overshoot, and half of a step goes further."""
+    return len(changes) == 3 and changes[2] > SWING * changes[1] > SWING**2 * changes[0]
 
 
 def _contraction(changes: Sequence[float]) -> float:
