@@ -53,8 +53,9 @@ struct lowpass {
     const double *sos, *zi;
 };
 
-/* Positions, given[t*sample + j*joint], moved by +step or -step as up (N, n) says if it is there, and filtered positions and velocities, in groups of LANES joints: (groups, N + 2 pad, LANES), the N
-samples in the middle. pad: the larger one of the two filters. ends: differences there are 1 one-sided, 2 of second order. */
+/* Positions, given[t*sample + j*joint], moved by +step or -step as up (N, n) says if it is there; filtered positions and velocities, in groups
+of LANES joints: (groups, N + 2 pad, LANES), the N samples in the middle. pad: the larger one of the two filters. ends: differences there are
+1 one-sided, 2 of second order. */
 struct states {
     int64_t N, n, sample, joint, pad, ends;
     double rate, step;
