@@ -147,9 +147,10 @@ def check_source(text: str, file: str) -> None:
         id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)
     }  # np, np.linalg only as np.name, np.linalg.name
     modules |= {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call) and _is_name(node.func, ARRAYS)}
+    known = BUILTINS | own | aliases
     for part in ast.walk(tree):
         if id(part) not in imports:
-            _check_node(part, BUILTINS | own | aliases, file)
+            _check_node(part, known, file)
         if isinstance(part, ast.Name) and part.id in aliases and id(part) not in modules:
             _refuse(part, f"{PACKAGES[part.id][0] if part.id in PACKAGES else part.id} itself is not passed on", file)
         if _is_linalg(part) and id(part) not in modules:
