@@ -104,9 +104,9 @@ struct entries {
     int64_t *taken;
 };
 
-/* m rows: signals U (., ustride), torques Y (n, ystride), mask (n, mstride) of rows used, NULL for all. */
+/* m rows: sample t of signal s is U[(t/tile*count + s)*tile + t%tile], torques Y (n, ystride), mask (n, mstride) of rows used, NULL for all. */
 struct rows {
-    int64_t m, ustride, ystride, mstride;
+    int64_t m, tile, count, ystride, mstride;
     const double *U, *Y;
     const uint8_t *mask;
 };
@@ -342,7 +342,7 @@ static int64_t used_rows(const struct entries *a, const struct rows *r, int64_t 
     }
     for (int64_t k = 0; k <= c; k++, out += stride) {
         const int32_t e = a->from[j] + (int32_t)k;
-        const double *u = k < c ? r->U + a->signal[e]*r->ustride + t : r->Y + j*r->ystride + t;
+        const double *u = k < c ? r->U + (t/r->tile*r->count + a->signal[e])*r->tile + t%r->tile : r->Y + j*r->ystride + t;
         const double sign = k < c ? a->sign[e] : 1.0;
         if (count == m)
             for (int64_t i = 0; i < m; i++)
@@ -363,11 +363,18 @@ static void work(enum task task, const struct entries *a, const struct rows *r, 
         const int64_t c = a->from[j + 1] - a->from[j], width = (c + 1 + SIDE - 1)/SIDE*SIDE;
         for (int64_t t = 0; t < r->m; t += SPAN) {
             const int64_t m = r->m - t < SPAN ? r->m - t : SPAN;
-            if (task == ROWS) {
-                a->taken[j] += used_rows(a, r, j, t, m, R + c + 1 + a->taken[j], c + 1 + a->most);
-                continue;
+            int64_t count = 0;
+            for (int64_t p = t, part; p < t + m; p += part) {
+                const int64_t left = r->tile - p%r->tile;
+                part = left < t + m - p ? left : t + m - p;
+                if (task == ROWS)
+                    a->taken[j] += used_rows(a, r, j, p, part, R + c + 1 + a->taken[j], c + 1 + a->most);
+                else
+                    count += used_rows(a, r, j, p, part, a->O + count, APART);
             }
-            const int64_t count = used_rows(a, r, j, t, m, a->O, APART), full = (count + WHOLE - 1)/WHOLE*WHOLE;
+            if (task == ROWS)
+                continue;
+            const int64_t full = (count + WHOLE - 1)/WHOLE*WHOLE;
             for (int64_t k = 0; k <= c; k++)
                 memset(a->O + k*APART + count, 0, (size_t)(full - count)*sizeof *a->O);
             for (int64_t k = c + 1; k < width; k++)
@@ -404,8 +411,8 @@ int32_t fused_residual(const struct entries *a, const struct rows *r, const doub
     return 0;
 }
 
-/* The same tasks, or the rows for a QR, on N samples of states and torques given (N, n), `step` at a time: from->U is (count, ustride) here,
-from->rows (4, n, ustride), with room for `step` samples. */
+/* The same tasks, or the rows for a QR, on N samples of states and torques given (N, n), `step` at a time: from->U has whole tiles for them,
+from->rows is (4, n, ustride) here. */
 int32_t fused_stream(int32_t task, const struct source *from, const struct entries *a, int64_t N, int64_t step, int64_t ustride,
                      const double *const given[4], const double *X)
 {
@@ -417,10 +424,14 @@ int32_t fused_stream(int32_t task, const struct source *from, const struct entri
             for (int64_t i = 0; i < m; i++)
                 for (int64_t j = 0; j < a->n; j++)
                     from->rows[k*size + j*ustride + i] = given[k][(t + i)*a->n + j];
-        if (from->signals(m, from->rows, from->rows + size, from->rows + 2*size, ustride, from->constants, from->U, ustride))
-            return 2;
-        const struct rows part = {m, ustride, ustride, 0, from->U, from->rows + 3*size, NULL};
-        work((enum task)task, a, &part, X);
+        for (int64_t p = 0; p < m; p += from->tile) {
+            const double *q = from->rows + p;
+            const int64_t part = m - p < from->tile ? m - p : from->tile;
+            if (from->signals(part, q, q + size, q + 2*size, ustride, from->constants, from->U + p*from->count, from->tile))
+                return 2;
+        }
+        const struct rows some = {m, from->tile, from->count, ustride, 0, from->U, from->rows + 3*size, NULL};
+        work((enum task)task, a, &some, X);
     }
     return 0;
 }

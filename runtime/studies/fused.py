@@ -85,7 +85,7 @@ class EntriesStructure(ctypes.Structure):
 class RowsStructure(ctypes.Structure):
     """struct rows."""
 
-    _fields_ = _fields("m ustride ystride mstride", "U Y mask")
+    _fields_ = _fields("m tile count ystride mstride", "U Y mask")
 
 
 STRUCTURES = (StatesStructure, SourceStructure, DecimationStructure, EntriesStructure, RowsStructure)

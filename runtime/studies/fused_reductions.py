@@ -163,7 +163,7 @@ class KeptRows(CRows):
 
     def passed(self, task: int, entries: EntriesStructure, X: Array | None) -> None:
         for y, Y, mask in self.parts:
-            rows = RowsStructure(Y.shape[1], y.shape[1], Y.shape[1], Y.shape[1], address(y), address(Y), address(mask))
+            rows = RowsStructure(Y.shape[1], y.shape[1], 0, Y.shape[1], Y.shape[1], address(y), address(Y), address(mask))
             if task == NORMAL:
                 call("normal", ctypes.byref(entries), ctypes.byref(rows))
             else:
@@ -174,7 +174,7 @@ class KeptRows(CRows):
             K = Y.shape[1]
             for k in range(0, K, entries.most):
                 starts = y.ctypes.data + 8 * k, Y.ctypes.data + 8 * k, mask.ctypes.data + k
-                call("rows", ctypes.byref(entries), ctypes.byref(RowsStructure(min(entries.most, K - k), y.shape[1], K, K, *starts)))
+                call("rows", ctypes.byref(entries), ctypes.byref(RowsStructure(min(entries.most, K - k), y.shape[1], 0, K, K, *starts)))
                 yield
 
 
@@ -206,7 +206,7 @@ class StreamedRows(CRows):
 
     def _stream(self, task: int, entries: EntriesStructure, X: Array | None, t: int, m: int) -> None:
         table, n = self.entries.model.signals, self.entries.n
-        U, rows = self.room.array("blockU", table.count, PADDED), self.room.array("block", 4, n, PADDED)
+        U, rows = self.room.array("blockU", table.count * -(-SPAN // table.tile) * table.tile), self.room.array("block", 4, n, PADDED)
         source = SourceStructure(table.address, address(self.constants), table.count, 0, table.tile, 0, None, address(U), address(rows))
         given: Any = (ctypes.c_void_p * 4)(*(address(x) + 8 * n * t for x in self.given))
         sizes = map(ctypes.c_int64, (m, SPAN, PADDED))

@@ -339,7 +339,7 @@ int main(void)
     struct entries entries = {n, K, start, signal, sign, array(8*16 + 64, 0), array(8*4 + 8, 0), array(8*APART, 0), array(8*3*(3 + K) + 5*(5 + K), 0), taken};
     uint8_t *mask = malloc(n*K);
     for (int i = 0; i < n*K; i++) mask[i] = (uint8_t)(i % 3 != 0);
-    struct rows rows = {K, K, K, K, plan.y, array(n*K, 1), mask};
+    struct rows rows = {K, K, 0, K, K, plan.y, array(n*K, 1), mask};
     bad |= fused_normal(&entries, &rows);
     total_of(entries.A, 8*16 + 64);
     double *X = array(20, 1);
@@ -348,7 +348,7 @@ int main(void)
     bad |= fused_rows(&entries, &rows);
     total_of(entries.R, 8*3*(3 + K) + 5*(5 + K));
     const double *given[4] = {array(40*n, 1), array(40*n, 1), array(40*n, 1), array(40*n, 1)};
-    struct source stream = {signals, &one, 9, 0, T, 0, NULL, array(9*19, 0), array(4*n*19, 0)};
+    struct source stream = {signals, &one, 9, 0, T, 0, NULL, array(9*2*T, 0), array(4*n*19, 0)};
     for (int32_t task = 0; task < 2; task++)
         bad |= fused_stream(task, &stream, &entries, 40, 17, 19, given, X);
     total_of(entries.A, 8*16 + 64);
