@@ -26,6 +26,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 from memory import BLOCK, identified, write_npz
 
 from runtime.cestac import cestac
@@ -174,6 +175,10 @@ def panel(axes: object, curves: Curves, x: str, y: str) -> None:
         )  # type: ignore[attr-defined]
         print(f"  {label:32} exponent {exponent:5.2f}   " + "  ".join(f"{a:g}: {b:.3g}" for a, b in points))
     axes.set(xlabel=x, ylabel=y)  # type: ignore[attr-defined]
+    if x == "joints":
+        axes.set_xticks([2, 4, 8, 16, 30], ["2", "4", "8", "16", "30"])  # type: ignore[attr-defined]
+    for axis in (axes.xaxis, axes.yaxis):  # type: ignore[attr-defined]
+        axis.set_minor_formatter(NullFormatter())
     axes.grid(True, which="major", lw=0.4, alpha=0.6)  # type: ignore[attr-defined]
     axes.legend(fontsize=7, frameon=False, title="(exponent over the last three points)", title_fontsize=6.5)  # type: ignore[attr-defined]
 
