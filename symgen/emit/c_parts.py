@@ -60,12 +60,14 @@ def _part(
 ) -> Part:
     words = words_of(line for _, line in group)
     own = [line for line in inputs if _defined(line) in words] + [f"const double {name} = V[{row[name]}][t];" for name in reads]
-    under: dict[str, list[str]] = {"Inputs": own}
+    under: list[tuple[str, list[str]]] = [("Inputs", own)]
     for title, line in group:
+        if title != under[-1][0]:  # the same heading may come again, later: lines stay in order
+            under.append((title, []))
         name = _defined(line)
-        under.setdefault(title, []).extend([line, f"V[{row[name]}][t] = {name};"] if name in row else [line])
+        under[-1][1].extend([line, f"V[{row[name]}][t] = {name};"] if name in row else [line])
     fixed = definitions(before, words)
-    sections = tuple(Section(title, tuple(lines)) for title, lines in under.items() if lines)
+    sections = tuple(Section(title, tuple(lines)) for title, lines in under if lines)
     return Part(fixed, sections, frozenset(words_of([*fixed, *(line for section in sections for line in section.lines)])))
 
 

@@ -112,6 +112,21 @@ def test_long_bodies_in_parts(compiler: str, tmp_path: Path, monkeypatch: pytest
     compare(library, numpy_module("two_branch", files("two_branch")["two_branch.py"]), (1, 131))
 
 
+@needs_compiler
+def test_long_chain(tmp_path: Path) -> None:
+    """Ten joints: bodies in parts of their own accord, headings that come again in one part (the columns of the inertia matrix)."""
+    frames = "\n".join(
+        f"  {j}: {{ant: {j - 1}, sigma: 0, alpha: {('0', '-pi/2', 'pi/2')[j % 3]}, d: L, theta: q{j}, r: 0.1}}" for j in range(1, 11)
+    )
+    robot = parse_robot(
+        f"symgen: 1\nname: chain\ngravity: [0, 0, -g]\nconstants: {{g: 9.81, L: 0.3}}\nframes:\n{frames}\n".encode(), file="chain.yaml"
+    )
+    emitted_files = generate_files(robot, targets=("numpy", "c"))
+    assert "inertia_matrix_part3(" in emitted_files["chain.c"]
+    library = ctypes.CDLL(str(compiled(tmp_path, emitted_files["chain.c"], COMPILERS[0], ["-O0", "-shared", "-fPIC", "-ffp-contract=off", "-DPORTABLE"])))
+    compare(library, numpy_module("chain", emitted_files["chain.py"]), (1, 33))
+
+
 def test_general_loops_have_none() -> None:
     assert all(not has_c_target(load_robot(name)) for name in GENERAL_LOOPS)
     assert emitted(["four_bar"], ("c",)) == {}
