@@ -46,7 +46,7 @@ def emitted(robots: list[str], targets: Sequence[str] = ("numpy",)) -> dict[str,
     modules: dict[str, str] = {}
     for source in packaged_robots() if robots == ["all"] else robots:
         robot = load_robot(source)
-        command = Path(source).name if source.endswith((".yaml", ".yml")) else source
+        command = Path(source).name if source.endswith((".yaml", ".yml", ".par", ".urdf")) else source
         files = generate_files(robot, targets=targets, command=command)
         if modules.keys() & files.keys():
             fail(f"two robots are called {robot.name}; their modules would overwrite each other")

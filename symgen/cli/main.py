@@ -19,6 +19,7 @@ VERBS = {
     "excite": "Search a motion that excites the parameters within the limits.",
     "simulate": "Simulate the closed loop of a study file and write its record.",
     "datasets": "List the measured records this program knows, and where they lie.",
+    "convert": "Write a robot in another format: .yaml, .par, .urdf.",
     "new": "Write a skeleton robot file.",
     "demo": "The main job end to end, with a report.",
 }

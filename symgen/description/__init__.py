@@ -1,11 +1,15 @@
 """What a user writes: robot files, read into the frozen Robot."""
 
 from symgen.description.expression import Expression
+from symgen.description.files import load_robot, packaged_robots, read_robot
 from symgen.description.grammar import parse
 from symgen.description.new import skeleton
+from symgen.description.par import read_par
+from symgen.description.par_write import write_par
 from symgen.description.robot import Drives, Element, Frame, Loop, Robot
 from symgen.description.schema import json_schema
-from symgen.description.yaml import load_robot, packaged_robots, parse_robot
+from symgen.description.yaml import parse_robot
+from symgen.description.yaml_write import write_yaml
 
 __all__ = [
     "Drives",
@@ -19,5 +23,9 @@ __all__ = [
     "packaged_robots",
     "parse",
     "parse_robot",
+    "read_par",
+    "read_robot",
     "skeleton",
+    "write_par",
+    "write_yaml",
 ]

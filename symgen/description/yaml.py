@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from importlib import resources
-from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -41,31 +39,6 @@ _CONSTANTS: dict[str, bool | None] = {"": None, "~": None, "null": None, "Null":
 _CONSTANTS |= {word: value for value, words in ((True, "true True TRUE"), (False, "false False FALSE")) for word in words.split()}
 
 
-def packaged_robots() -> tuple[str, ...]:
-    """Names that `load_robot` knows without a path."""
-    folder = resources.files("symgen.description") / "robots"
-    return tuple(sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml")))
-
-
-def load_robot(source: str | Path) -> Robot:
-    """The robot described by a YAML file, or a packaged one by its name.
-
-    Parameters
-    ----------
-    source : name of a packaged robot (`tx40`) or path of a robot file (`arm.yaml`, `./tx40`).
-
-    Raises
-    ------
-    DescriptionError : the file cannot be read or describes no robot; names file and line.
-    """
-    if source in packaged_robots():
-        file = f"{source}.yaml"
-        content = (resources.files("symgen.description") / "robots" / file).read_bytes()
-    else:
-        file, content = Path(source).name, _read(Path(source))
-    return parse_robot(content, file)
-
-
 def parse_robot(content: bytes, file: str) -> Robot:
     """The robot described by the bytes of a file called `file`."""
     lines: dict[model.Path, int] = {}
@@ -81,18 +54,6 @@ def parse_robot(content: bytes, file: str) -> Robot:
     except DescriptionError as error:
         line = error.line or next((lines[error.path[:k]] for k in range(len(error.path), -1, -1) if error.path[:k] in lines), 1)
         raise DescriptionError(error.message, path=error.path, file=file, line=line) from error.__cause__
-
-
-def _read(path: Path) -> bytes:
-    known = ", ".join(packaged_robots())
-    try:
-        with path.open("rb") as stream:
-            return stream.read(MAX_BYTES + 1)
-    except FileNotFoundError as error:
-        raise DescriptionError(f"no file {path} and no packaged robot of that name; packaged are {known}", file=path.name) from error
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise DescriptionError(f"cannot read {path}: {reason}; expected a robot file or one of {known}", file=path.name) from error
 
 
 def _check_version(data: Any) -> None:

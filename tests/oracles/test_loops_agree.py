@@ -23,7 +23,7 @@ from symgen.derive.loops import close as close_loops
 from symgen.description.expression import Expression
 from symgen.description.grammar import parse
 from symgen.description.robot import REVOLUTE, Robot
-from symgen.description.yaml import load_robot
+from symgen.description import load_robot
 from symgen.emit.render import render
 from symgen.emit.spec import module_spec
 from symgen.regroup.certificate import certify

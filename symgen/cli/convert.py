@@ -1,0 +1,63 @@
+"""`symgen convert IN OUT`: a robot from one format into another, with a report of what the target cannot carry."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from symgen.cli.session import fail, reported_errors
+from symgen.cli.writing import write_all
+
+if TYPE_CHECKING:
+    from symgen.description import Robot
+
+SUFFIXES = (".yaml", ".yml", ".par")
+
+
+def convert(
+    source: Annotated[str, typer.Argument(metavar="IN", help="Packaged robot, or a file: .yaml, .par.")],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; its suffix names the format: .yaml, .par.")],
+    constant: Annotated[list[str] | None, typer.Option(help="Value of a symbol of a .par file, D3=0.45 (SI, rad); repeat.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace OUT if it exists.")] = False,
+) -> None:
+    """Write the robot IN in the format of OUT, and say what was read otherwise than written and what OUT does not carry.
+
+    OUT is written whole or not at all; where the target would hold another mechanism nothing is written, exit code 2.
+    """
+    with reported_errors():
+        if output.suffix.lower() not in SUFFIXES:
+            fail(f"{output}: expected a file name that ends in {', '.join(SUFFIXES)}")
+        if output.exists() and not force:
+            fail(f"{output} exists already; choose another name or add --force")
+        from symgen.description import read_robot
+
+        robot, read = read_robot(source, constants=dict(map(_constant, constant or ())))
+        text, written = _text(robot, output, read)
+        write_all(output.parent, {output.name: text})
+        typer.echo(f"{output}: {robot.name}, {len(robot.joints)} joints, {len(robot.parameters)} standard parameters")
+        for head, notes in ((f"read from {source}", read), (f"not carried by {output.name}", written)):
+            if notes:
+                typer.echo("\n".join([f"{head}:", *(f"  - {note}" for note in notes)]))
+
+
+def _constant(text: str) -> tuple[str, float]:
+    from symgen.description import parse
+
+    name, equals, value = text.partition("=")
+    if not (name.strip() and equals):
+        fail(f"--constant {text}; expected NAME=NUMBER")
+    try:
+        return name.strip(), float(parse(value, ()))
+    except (ValueError, ZeroDivisionError, OverflowError):
+        fail(f"--constant {text}; expected NAME=NUMBER")
+
+
+def _text(robot: Robot, output: Path, read: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+    """Text of the file and what it does not carry."""
+    from symgen.description import write_par, write_yaml
+
+    if output.suffix.lower() == ".par":
+        return write_par(robot)
+    return write_yaml(robot, comments=[f"Converted from {robot.file}.", *read]), ()

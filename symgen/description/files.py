@@ -1,0 +1,61 @@
+"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par` and URDF, by suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+
+from symgen.description.par import read_par
+from symgen.description.robot import Robot
+from symgen.description.yaml import parse_robot
+from symgen.errors import DescriptionError
+
+MAX_BYTES = 10_000_000  # no format reads more; each has a limit of its own below
+
+
+def packaged_robots() -> tuple[str, ...]:
+    """Names that `load_robot` knows without a path."""
+    folder = resources.files("symgen.description") / "robots"
+    return tuple(sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml")))
+
+
+def load_robot(source: str | Path) -> Robot:
+    """The robot described by a file, or a packaged one by its name.
+
+    Parameters
+    ----------
+    source : name of a packaged robot (`tx40`) or path of a robot file (`arm.yaml`, `./tx40`), a `.par` file or a `.urdf`.
+
+    Raises
+    ------
+    DescriptionError : the file cannot be read or describes no robot; names file and line.
+    """
+    return read_robot(source)[0]
+
+
+def read_robot(source: str | Path, *, constants: Mapping[str, float] | None = None) -> tuple[Robot, tuple[str, ...]]:
+    """As `load_robot`, with notes on what of a foreign format was read otherwise than written, or not at all.
+
+    constants : values of the symbols of a `.par` file, which has no place for them.
+    """
+    if source in packaged_robots():
+        file = f"{source}.yaml"
+        return parse_robot((resources.files("symgen.description") / "robots" / file).read_bytes(), file), ()
+    path = Path(source)
+    content = _read(path)
+    if path.suffix.lower() == ".par":
+        return read_par(content, path.name, constants)
+    return parse_robot(content, path.name), ()
+
+
+def _read(path: Path) -> bytes:
+    known = ", ".join(packaged_robots())
+    try:
+        with path.open("rb") as stream:
+            return stream.read(MAX_BYTES + 1)
+    except FileNotFoundError as error:
+        raise DescriptionError(f"no file {path} and no packaged robot of that name; packaged are {known}", file=path.name) from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise DescriptionError(f"cannot read {path}: {reason}; expected a robot file or one of {known}", file=path.name) from error

@@ -1,0 +1,172 @@
+"""`.par` files of SYMORO: written, read again, the same robot and formulas; a foreign file; every fault is an error with its line."""
+
+import re
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from oracles.random_robots import random_robot
+from symgen.description import load_robot, packaged_robots, read_par, write_par, write_yaml
+from symgen.description.yaml import parse_robot
+from symgen.errors import DescriptionError
+from symgen.regroup.regrouping import regroup
+
+# A parallelogram in a vertical plane, as older programs write it: Pi, ^, capital keys, lists over lines, constants without values.
+FOREIGN = """\
+(*****  SYMORO+ : Parameters of a robot  *****)
+(* General parameters
+   over two lines *)
+(* Robotname = 'pantograph' *)
+NF = 6
+NL = 4
+NJ = 5
+Type = 2   (* Closed *)
+Ant = {0, 1, 0,
+ 3, 4, 2}
+Sigma = {0,0,0,0,0,2}
+B = {0,0,0,0,0,0}
+d = {0,L1,0,2*L2^2/(2*L2),L1,-L2}
+R = {0,0,0,0,0,0}
+gamma = {0,0,0,0,0,0}
+Alpha = {0,0,0,0,0,0}
+Mu = {1,0,1,0,0,0}
+Theta = {t1,t2,t3,t4,t5,0}
+XX = {XX1,XX2,XX3,0}
+XY = {XY1,XY2,XY3,0}
+XZ = {XZ1,XZ2,XZ3,0}
+YY = {YY1,YY2,YY3,0}
+YZ = {YZ1,YZ2,YZ3,0}
+ZZ = {0.25,J2,ZZ3,0}
+MX = {MX1,MX2,MX3,0}
+MY = {0,MY2,MY3,0}
+MZ = {MZ1,MZ2,MZ3,0}
+M = {M1,M2,M3,0}
+IA = {IA1,0,IA3,0}
+FV = {FV1,FV2,0,FV4}
+FS = {0,0,0,0}
+FX = {0,0,0,FX4}
+QP = {QP1,QP2,QP3,QP4,QP5}
+G = {0,G2,0}
+Z = {1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1}
+(* End of definition *)
+"""
+VALUES = {"L1": 0.4, "L2": 0.2, "G2": -9.81}
+
+
+def error_of(text, constants=VALUES):
+    with pytest.raises(DescriptionError) as caught:
+        read_par(text.encode(), "arm.par", constants)
+    assert caught.value.file == "arm.par" and caught.value.line is not None
+    return caught.value
+
+
+def formulas(robot):
+    return {b.name: b.formula for b in regroup(robot).base}
+
+
+@pytest.mark.parametrize("name", [name for name in packaged_robots() if name != "haptic"])
+def test_packaged_robots_keep_their_formulas(name):
+    """The parameters without a place in the format are those that the notes name; with OFFSET others may carry the rest."""
+    robot = load_robot(name)
+    text, notes = write_par(robot)
+    again, _ = read_par(text.encode(), f"{name}.par")
+    lost = set(robot.parameters) - set(again.parameters)
+    assert lost == set(" ".join(notes[:1]).replace(",", "").split(": ")[1].split())
+    assert again.parameters == tuple(p for p in robot.parameters if p not in lost)
+    assert (again.constants, again.gravity, again.frames, again.massless) == (robot.constants, robot.gravity, robot.frames, robot.massless)
+    assert again.loops == robot.loops
+    assert dict(again.values) == {p: v for p, v in robot.values.items() if p not in lost}
+    kept = replace(robot, elements=again.elements, values={}, drives=None)
+    assert formulas(again) == formulas(kept) and formulas(kept)
+
+
+def test_relations_beside_the_loops_are_refused():
+    with pytest.raises(DescriptionError, match=r"no place for q4 = -q5 \+ c|no place for q4 = c - q5"):
+        write_par(load_robot("haptic"))
+
+
+def test_random_robots_come_back():
+    for seed in range(60):
+        robot = random_robot(seed)
+        again, _ = read_par(write_par(robot)[0].encode(), "x.par")
+        assert (again.frames, again.gravity, again.massless) == (robot.frames, robot.gravity, robot.massless)
+        assert all(again.constants[s] == robot.constants[s] for s in again.constants)
+
+
+def test_foreign_file():
+    robot, notes = read_par(FOREIGN.encode("latin-1"), "pantograph.par", VALUES)
+    assert robot.name == "pantograph" and robot.joints == (1, 3) and robot.links == (1, 2, 3)
+    assert [str(robot.frame(4).d), str(robot.frame(2).theta)] == ["L2", "q2"]
+    assert [(loop.cut, loop.twin) for loop in robot.loops] == [(5, 6)]
+    assert dict(robot.values) == {"ZZ1": 0.25, "MY1": 0.0}
+    assert [name for name in robot.parameters if name[:2] in ("Ia", "FV", "FS")] == ["Ia1", "FV1", "FV2", "Ia3", "FV4"]
+    assert "ZZ2 (written J2)" in notes[0] and "MY1" in notes[1] and "FX" in notes[2]
+    assert regroup(robot).base
+
+
+def test_values_of_symbols_from_a_comment_or_an_argument():
+    assert "no value of G2, L1, L2" in error_of(FOREIGN, {}).message
+    text = FOREIGN + "(* constants: L1 = 0.4, L2 = 2/10,\n G2 = -9.81 *)"
+    assert dict(read_par(text.encode(), "a.par")[0].constants) == VALUES
+    assert read_par(text.encode(), "a.par", {"L1": 7})[0].constants["L1"] == 7
+
+
+def test_decimal_quarter_turns_become_exact_and_are_noted():
+    robot, notes = read_par(FOREIGN.replace("gamma = {0", "gamma = {1.5708").encode(), "a.par", VALUES)
+    assert str(robot.frame(1).gamma) == "pi/2" and any("1.5708 read as pi/2" in note for note in notes)
+
+
+WRONG = [  # what is replaced, by what, line of the error, words of the message
+    ("NL = 4", "NL = four", 6, "whole number"),
+    ("NL = 4\n", "", 1, "NL is missing"),
+    ("NJ = 5", "NJ = 6", 6, "NF = 2 NJ - NL"),
+    ("Type = 2", "Type = 0", 6, "closed loops"),
+    ("NF = 6\n", "NF = 6\nis_mobile = 1\n", 6, "base that moves"),
+    ("R = {0,0,0,0,0,0}", "R = {0,0,0}", 14, "3 entries; expected 6"),
+    ("R = {0,0,0,0,0,0}", "R = {0,0,0,0,0,0", 14, "expected `name = value`"),
+    ("R = {0,0,0,0,0,0}\n", "", 1, "r is missing"),
+    ("3, 4, 2}", "3, 9, 2}", 10, "ant = 9"),
+    ("Sigma = {0", "Sigma = {3", 11, "sigma = 3"),
+    ("Mu = {1", "Mu = {2", 17, "mu = 2"),
+    ("d = {0", "d = {import(os)", 13, "import"),
+    ("d = {0", "d = {t2", 13, "t2 is the variable of a joint"),
+    ("d = {0", "d = {1/0", 13, "division by zero"),
+    ("d = {0", "d = {2^9999", 13, "exponent"),
+    ("d = {0", "d = {" + "(" * 99, 13, "deep"),
+    ("Theta = {t1", "Theta = {2*t1", 18, "q1 once"),
+    ("Theta = {t1", "Theta = {a + b", 18, "joint variable"),
+    ("G = {0,G2,0}", "G = {0,G2}", 34, "2 entries"),
+    ("Mu = ", "Ant = {0,1,0,3,4,2}\nMu = ", 17, "given twice (first on line 9)"),
+    ("(* End", "(* constants: L1 = x *)\n(* End", 36, "expected name = number"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "line", "words"), WRONG)
+def test_faults_are_errors_with_their_line(old, new, line, words):
+    assert old in FOREIGN
+    error = error_of(FOREIGN.replace(old, new, 1))
+    assert words in error.message and error.line == line
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_mangled_files_raise_nothing_else(data):
+    text = FOREIGN
+    for _ in range(data.draw(st.integers(1, 4))):
+        at, length = data.draw(st.integers(0, len(text))), data.draw(st.integers(0, 12))
+        text = text[:at] + data.draw(st.text(alphabet="{}(*)=,^0123456789.eEqtXM \n\x00é", max_size=8)) + text[at + length :]
+    try:
+        read_par(text.encode("utf-8", "surrogatepass"), "arm.par", VALUES)
+    except DescriptionError as error:
+        assert re.search(r"\(arm\.par, line \d+\)$", str(error))
+
+
+@pytest.mark.parametrize("name", packaged_robots())
+def test_robot_files_written_and_read_are_the_same_robot(name):
+    robot = load_robot(name)
+    again = parse_robot(write_yaml(robot, comments=["written by a test"]).encode(), robot.file)
+    for field in ("name", "title", "source", "frames", "gravity", "constants", "elements", "loops", "constraints", "massless", "drives"):
+        assert getattr(again, field) == getattr(robot, field), field
+    assert dict(again.limits) == dict(robot.limits) and dict(again.values) == dict(robot.values)
