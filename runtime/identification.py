@@ -203,7 +203,8 @@ def observed(
     """
     in_memory = [record for record in records if isinstance(record, Record)]
     if simulator is not None and in_memory:
-        return closed_loop(model, in_memory, study, simulator, reference=study.estimate.options.get("reference", "known")).measured()
+        asked = {key: study.estimate.options[key] for key in ("reference", "around") if key in study.estimate.options}
+        return closed_loop(model, in_memory, study, simulator, **asked).measured()
     if in_memory:
         return stack([rows_of(model, record, study) for record in in_memory])
     return reduce_records(model, [record for record in records if not isinstance(record, Record)], study, windows=windows)

@@ -38,7 +38,7 @@ RISE, FALL = 5.0, 0.3
 class Options:
     """estimate.options of cloe. output : "position", or "torque" (CLIE).   start : "iv", "ols" or "values".   passes : of each of two searches.
 
-    step, decrease : stop: largest |dX/D|, or relative decrease of the criterion.   reference : as for iv and didim.
+    step, decrease : stop: largest |dX/D|, or relative decrease of the criterion.   reference, around : as for iv and didim.
     """
 
     output: Literal["position", "torque"] = "position"
@@ -47,6 +47,7 @@ class Options:
     step: float = 1e-4
     decrease: float = 1e-6
     reference: Literal["known", "measured"] = "known"
+    around: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("passes", "step", "decrease"):

@@ -37,7 +37,8 @@ class Options:
     start : X^0: "ols", "values" of the robot file, "unit" (motor inertia, else inertia or mass of the own link, 1 for every joint; rest 0), or
         parameters by name, the others 0.
     gains : X_ref of g: "ols", "values", "start", or "one" (no rescaling).   passes : largest number with rescaled gains, and with g = 1.
-    change, residual : the stop.   reference : "known", or "measured" where the reference has to be inferred (`runtime.closed_loop`).
+    change, residual : the stop.   reference : "known", or "measured" where the reference has to be inferred, and around : s about slow rows that are left
+    out with them (`runtime.closed_loop`).
     """
 
     start: Literal["ols", "values", "unit"] | Mapping[str, float] = "ols"
@@ -46,6 +47,7 @@ class Options:
     change: float = 0.1
     residual: float = 1e-3
     reference: Literal["known", "measured"] = "known"
+    around: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("passes", "change", "residual"):
@@ -133,6 +135,11 @@ def iterate(loop: ClosedLoop, seen: Observation, options: Options, update: Calla
     X = initial(loop, seen, options.start)
     reference = X if options.gains in ("start", "one") else initial(loop, seen, options.gains)
     J = None if options.gains == "one" else loop.inertia(full(names, reference, every))
+    if J is not None and not np.all(J > 0):
+        raise InputError(
+            f"gains: {options.gains}: these parameters have no positive inertia about joint {int(np.argmin(J)) + 1}; refer the gains to others: "
+            "estimate.options.gains: values, start, or one"
+        )
     trail: list[dict[str, Any]] = []
     step: Step | None = None
     changes: list[float] = []
@@ -179,7 +186,10 @@ def _simulated(
         except InputError as e:
             reason = str(e)
             if before is None:
-                raise
+                raise InputError(
+                    f"the loop cannot be simulated with the parameters it starts from: {reason}. Those of least squares need not be physical: "
+                    "give estimate.options.start: values (robot file), unit, or parameters by name; gains: start with them"
+                ) from None
             X = (X + before) / 2
     return X, g, (), f"The simulation cannot be made, also after {HALVINGS} halved steps: {reason}"
 
