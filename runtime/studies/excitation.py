@@ -3,9 +3,8 @@
 From each start, first -log det(W_w'W_w) is lowered, which is smooth and does not depend on the scale of a column, then the criterion itself.
 Condition numbers and largest deviations are followed by the smooth bounds
 
-    s_max <= (tr A^4)^(1/8),   1/s_min <= (tr C^4)^(1/8),   max_i C_ii <= (sum_i C_ii^4)^(1/4),     A = W_w'W_w, C = A^-1,
+    cond^2 <= (tr A^8 tr C^8)^(1/8),     max_i C_ii <= (sum_i C_ii^8)^(1/8),     A = W_w'W_w, C = A^-1.
 
-and "cond" stands for s_max/s_min^2: a small condition number alone is also had by exciting the well known parameters less.
 Limits hold at the points of the grid with a margin, which is widened until they hold at the controller rate. sign(qd) is tanh(qd/v0) here and
 sign(qd) again in every figure that is reported.
 """
@@ -194,9 +193,9 @@ def _spread(A: Any, criterion: str) -> Any:
     """Logarithm of the smooth bound of the criterion."""
     C = ca.solve(A, ca.DM.eye(A.shape[0]), "qr")
     if criterion == "sigma":
-        return ca.log(ca.sum1(ca.diag(C) ** 4)) / 4
-    A2, C2 = ca.mtimes(A, A), ca.mtimes(C, C)
-    return (ca.log(ca.sumsqr(A2)) + 2 * ca.log(ca.sumsqr(C2))) / 8
+        return ca.log(ca.sum1(ca.diag(C) ** 8)) / 8
+    A4, C4 = (ca.mtimes(x, x) for x in (ca.mtimes(A, A), ca.mtimes(C, C)))
+    return (ca.log(ca.sumsqr(A4)) + ca.log(ca.sumsqr(C4))) / 8
 
 
 def _constraints(symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q: Any, qd: Any, qdd: Any) -> tuple[Any, Array, Array]:
