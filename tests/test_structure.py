@@ -14,10 +14,11 @@ ARROWS = {  # part: parts of symgen it may import, itself and BASE aside
     "symgen.derive": {"symgen.description"},
     "symgen.regroup": {"symgen.description", "symgen.derive"},
     "symgen.emit": {"symgen.description", "symgen.derive", "symgen.regroup"},
-    "symgen.cli": {"symgen.description", "symgen.derive", "symgen.regroup", "symgen.emit"},
+    "symgen.report": {"symgen.description", "symgen.derive", "symgen.regroup", "symgen.emit"},
+    "symgen.cli": {"symgen.description", "symgen.derive", "symgen.regroup", "symgen.emit", "symgen.report"},
 }
 ONLY_IN = {  # library: files and folders that may import it
-    "jinja2": ("symgen/emit/render.py", "runtime/report/"),
+    "jinja2": ("symgen/emit/render.py", "symgen/report/page.py", "runtime/report/"),
     "matplotlib": ("runtime/report/",),
     "typer": ("symgen/cli/",),
     "rich": ("symgen/cli/",),

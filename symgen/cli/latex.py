@@ -8,20 +8,15 @@ from fractions import Fraction
 
 from symgen.description.expression import ONE, Call, Expression
 from symgen.regroup.regrouping import shared
+from symgen.report.symbols import symbol
 
-FAMILIES = {"Ia": ("I", "a"), "FV": ("F", "v"), "FS": ("F", "s"), "FVM": ("F", "vm"), "FSM": ("F", "sm")}
 GREEK = re.compile(r"(alpha|beta|gamma|delta|theta|phi|psi)")
 
 
 def latex_name(name: str) -> str:
     """Symbol of a parameter or constant."""
-    match = re.fullmatch(r"(.*?[^\d_])[_]?(\d*)(R?)", name)
-    if match is None:
-        return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
-    stem, index, regrouped = match.groups()
-    letter, prefix = FAMILIES.get(stem, (stem, ""))
+    letter, subscript = symbol(name)
     text = GREEK.sub(r"\\\1 ", letter).replace("_", r"\_").strip()
-    subscript = prefix + index + regrouped
     return f"{text}_{{{subscript}}}" if subscript else text
 
 

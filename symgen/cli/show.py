@@ -1,13 +1,15 @@
-"""`symgen show ROBOT`: base parameters with their regrouping formulas, as text, LaTeX or JSON."""
+"""`symgen show ROBOT`: base parameters with their regrouping formulas, as text, LaTeX or JSON; or a page to look at."""
 
 from __future__ import annotations
 
 import difflib
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from symgen.cli.session import fail, reported_errors
+from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
     from symgen.regroup.regrouping import BaseParameter, Regrouping
@@ -21,9 +23,20 @@ def show(
     only: Annotated[str | None, typer.Option(help="One base parameter, e.g. XX2R.")] = None,
     recursive: Annotated[bool, typer.Option("--recursive", help="Link by link, as SYMORO prints, instead of flat as eq. (27).")] = False,
     json: Annotated[bool, typer.Option("--json", help="Same as --format json.")] = False,
+    html: Annotated[
+        bool, typer.Option("--html", help="One page to look at: the robot in 3D, its frames and formulas; no network.")
+    ] = False,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="File of the page; <name>.html where left out.")] = None,
 ) -> None:
     """Print the base parameters of ROBOT, what they are made of, what has no effect, and what the models cost."""
     with reported_errors():
+        if html and (only or recursive or json or format != "text"):
+            fail("--html shows everything; leave out --format, --only, --recursive and --json")
+        if html:
+            typer.echo(f"{write_page(robot, output)}")
+            return
+        if output is not None:
+            fail("-o names the file of --html; the other formats are printed")
         kind = "json" if json else format
         if kind not in FORMATS:
             fail(f"format {kind!r}; expected one of {', '.join(FORMATS)}")
@@ -42,6 +55,17 @@ def show(
             typer.echo(recursive_text(regrouping))
         else:
             typer.echo({"text": flat_text, "latex": latex_text, "json": json_text}[kind](regrouping, only))
+
+
+def write_page(robot: str, output: Path | None) -> Path:
+    """The page of ROBOT, whole or not at all; its path."""
+    from symgen.description import load_robot
+    from symgen.regroup.regrouping import regroup
+    from symgen.report.page import robot_page
+
+    regrouping = regroup(load_robot(robot))
+    path = output or Path(f"{regrouping.robot.name}.html")
+    return write_all(path.parent, {path.name: robot_page(regrouping)})[0]
 
 
 def chosen(regrouping: Regrouping, only: str | None) -> list[BaseParameter]:

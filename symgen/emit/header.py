@@ -60,19 +60,20 @@ def one_sided_friction_that_absorbs(spec: ModuleSpec) -> list[str]:
 
 def frame_table(robot: Robot) -> list[str]:
     """The rows of the frame table, aligned; columns that are zero everywhere are left out, except the classical six."""
-    rows = [[str(getattr(f, c)) for c in COLUMNS] for f in robot.frames]
-    kept = [k for k, c in enumerate(COLUMNS) if c in ("j", "ant", "sigma", "alpha", "d", "theta", "r") or _informative(c, rows, k)]
-    table = [[COLUMNS[k] for k in kept], *([row[k] for k in kept] for row in rows)]
+    kept = informative_columns(robot)
+    table = [list(kept), *([str(getattr(f, c)) for c in kept] for f in robot.frames)]
     widths = [max(len(row[k]) for row in table) for k in range(len(kept))]
     return ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
 
 
-def _informative(column: str, rows: Sequence[Sequence[str]], k: int) -> bool:
-    return (
-        any(row[k] != "0" for row in rows)
-        if column != "mu"
-        else any(row[k] == "0" and row[COLUMNS.index("sigma")] != str(FIXED) for row in rows)
-    )
+def informative_columns(robot: Robot) -> tuple[str, ...]:
+    """The classical six with j and ant, and of the others those that say something."""
+    said = {
+        "mu": any(not f.mu for f in robot.frames if f.sigma != FIXED),
+        "gamma": any(f.gamma for f in robot.frames),
+        "b": any(f.b for f in robot.frames),
+    }
+    return tuple(c for c in COLUMNS if said.get(c, True))
 
 
 def element_lines(robot: Robot) -> list[str]:

@@ -1,0 +1,1 @@
+"""One self-contained HTML page of a robot: drawing, frame table, formulas, what each parameter does, certificate."""
