@@ -67,9 +67,7 @@ def main() -> None:
         limits,
         fit.X,
         workers=given.workers,
-        progress=lambda start, done, total: print(
-            f"  start {start.number}: {start.criterion:.3f} {start.message} ({done}/{total})", flush=True
-        ),
+        progress=lambda done, total: print(f"  {done} of {total} starts", flush=True),
     )
     wall = time.perf_counter() - begin
     before, correlation = weights.condition(seen), kept_correlation(study.signals, RATE)

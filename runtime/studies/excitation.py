@@ -80,12 +80,12 @@ def excite(
     X: Array,
     *,
     workers: int = 0,
-    progress: Callable[[Start, int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
     """The motion of smallest criterion over all starts, within the limits at the controller rate.
 
     symbolic_path : the casadi module of the same robot.   X : base parameters for torques, shape (b,).
-    workers : processes, 0 for this one; results do not depend on it.   progress : called after each start.
+    workers : processes, 0 for this one; results do not depend on it.   progress : called after each start with the number done and their total.
     Raises InputError where no start keeps the limits, with the limit that was missed most.
     """
     starts: list[Start] = []
@@ -93,7 +93,7 @@ def excite(
     for start in results(one_start, problem, range(settings.starts), workers):
         starts.append(start)
         if progress is not None:
-            progress(start, len(starts), settings.starts)
+            progress(len(starts), settings.starts)
     starts.sort(key=lambda s: s.number)
     kept = sorted((s for s in starts if s.violation <= TOLERATED), key=lambda s: s.criterion)
     if not kept:

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from symgen.cli.session import NEGATIVE, in_target, opened_model, origin, reported_errors, single_thread, study_and_records, study_text
+from symgen.cli.session import (
+    NEGATIVE,
+    in_target,
+    opened_model,
+    origin,
+    progress_bar,
+    reported_errors,
+    single_thread,
+    study_and_records,
+    study_text,
+)
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
@@ -68,7 +78,7 @@ def cestac(
             raise typer.Exit(NEGATIVE if advised(model, study, folder, records, asked, output, json) else 0)
         checkpoint = None if output is None else Checkpoint(output)
         model = in_target(robot, model, target)
-        with progress_bar() as progress, kept_runs(checkpoint):
+        with progress_bar("runs") as progress, kept_runs(checkpoint):
             result = study_of_resolution.cestac(
                 model,
                 records,
@@ -112,25 +122,6 @@ def kept_runs(checkpoint: Checkpoint | None) -> Iterator[None]:
         )
         typer.echo(f"stopped; {kept}", err=True)
         raise typer.Exit(INTERRUPTED) from None
-
-
-def progress_bar() -> Any:
-    """A bar on the error stream; the context gives what `cestac` calls as runs are done."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    @contextmanager
-    def bar() -> Any:
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-            task = progress.add_task("runs", total=None)
-
-            def advance(done: int, total: int) -> None:
-                progress.update(task, completed=done, total=total)
-
-            yield advance
-
-    return bar()
 
 
 def console_text(result: Cestac) -> str:

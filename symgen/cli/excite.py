@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from symgen.cli.session import opened_model, reported_errors, single_thread, study_and_records, symbolic_file
+from symgen.cli.session import opened_model, progress_bar, reported_errors, single_thread, study_and_records, symbolic_file
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from runtime.excitation import Limits, Weights
     from runtime.excitation_settings import ExcitationSettings
     from runtime.model import GeneratedModel
     from runtime.record import Record
-    from runtime.studies.excitation import Excitation, Start
+    from runtime.studies.excitation import Excitation
     from runtime.study import Study
 
 
@@ -76,7 +74,7 @@ def excite(
         settings = structure(ExcitationSettings, {**asked, **{k: v for k, v in given.items() if v is not None}})
         known = _known(model, replace(study, excitation=settings), settings, records)
         limits = limits_of(model, settings.limits)
-        with progress_bar(settings.starts) as progress:
+        with progress_bar("starts") as progress:
             path = str(symbolic_file(robot, model))
             found = search(model, path, known.study, settings, known.weights, limits, known.X, workers=workers, progress=progress)
         summary = summary_of(model, found, known, settings, limits)
@@ -205,27 +203,6 @@ def json_of(summary: dict[str, Any]) -> str:
     from runtime.estimate import json_text
 
     return json_text(summary)
-
-
-def progress_bar(total: int) -> Any:
-    """A bar over the starts on the error stream; the context gives what the search calls after each."""
-    from contextlib import contextmanager
-
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    @contextmanager
-    def bar() -> Iterator[Any]:
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-            task = progress.add_task("starts", total=total)
-
-            def advance(start: Start, done: int, total: int) -> None:
-                progress.update(task, completed=done, total=total)
-
-            yield advance
-
-    return bar()
 
 
 def _yaml(mapping: dict[str, Any]) -> str:

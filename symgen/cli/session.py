@@ -172,3 +172,22 @@ def study_text(study: Study, folder: Path, destination: Path) -> str:
     stream = StringIO()
     yaml.dump(to_mapping(complete), stream)
     return stream.getvalue()
+
+
+def progress_bar(what: str) -> Any:
+    """A bar of `what` on the error stream; the context gives what long work calls with the number done and their total."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    @contextmanager
+    def bar() -> Any:
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+            task = progress.add_task(what, total=None)
+
+            def advance(done: int, total: int) -> None:
+                progress.update(task, completed=done, total=total)
+
+            yield advance
+
+    return bar()
