@@ -4,7 +4,8 @@
 
 g refers to X_ref, which is not the truth: the last passes need g = 1. A parameter vector whose loop cannot be simulated (inertia not positive
 definite, unstable) is refused: the step towards it is halved, at most five times. Stop: max |dX_i|/sigma_i < 0.1 and the norm of the residual
-changes by less than 1e-3 of itself, or the change is rounding. Where passes overshoot, the steps that follow are shortened.
+changes by less than 1e-3 of itself, or the change is rounding. A loose loop makes passes of DIDIM overshoot: from the third pass on the steps are
+those of Anderson (1965), f_k = X_next - X^k, gamma = argmin |f_k - dF gamma| over the last differences, X^(k+1) = X^k + f_k - (dX + dF) gamma.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ Array = np.ndarray
 HALVINGS = 5
 SLOW = 0.9  # contraction above which the fixed point is hardly one
 ROUGH = 10.0  # the stop of passes with rescaled gains, which only lead to the last ones, over that of the last ones
-SWING = 0.7  # contraction above which steps are halved
+MEMORY = 3  # differences that the next step is made of
 
 
 @dataclass(frozen=True)
@@ -143,10 +144,12 @@ def iterate(loop: ClosedLoop, seen: Observation, options: Options, update: Calla
     trail: list[dict[str, Any]] = []
     step: Step | None = None
     changes: list[float] = []
-    converged, message, share = False, "", 1.0
+    converged, message = False, ""
     for rescaled in (True, False) if J is not None else (False,):
         previous: Step | None = None
         converged = False
+        points: list[Array] = []
+        steps: list[Array] = []
         for _ in range(options.passes):
             X, g, runs, message = _simulated(loop, names, every, X, trail[-1]["X"] if trail else None, J if rescaled else None)
             if step is not None and message:
@@ -160,9 +163,8 @@ def iterate(loop: ClosedLoop, seen: Observation, options: Options, update: Calla
             trail.append({"X": X, "next": step.X, "norm": step.norm, "g": g, "change": change})
             still = previous is not None and abs(step.norm - previous.norm) <= options.residual * previous.norm
             rounding = bool(np.all(moved <= 1e-9 * np.max(np.abs(step.X))))
-            if _swings(changes[-3:]):
-                share = max(share / 2, 0.25)
-            X, previous = X + share * (step.X - X), step
+            points, steps, previous = [*points, X][-MEMORY - 1 :], [*steps, step.X - X][-MEMORY - 1 :], step
+            X = _accelerated(points, steps, size)
             if (change < options.change * (ROUGH if rescaled else 1) and still) or rounding:
                 converged = True
                 break
@@ -188,15 +190,19 @@ def _simulated(
             if before is None:
                 raise InputError(
                     f"the loop cannot be simulated with the parameters it starts from: {reason}. Those of least squares need not be physical: "
-                    "give estimate.options.start: values (robot file), unit, or parameters by name; gains: start with them"
+                    "give estimate.options.start: values (robot file), unit, or parameters by name"
                 ) from None
             X = (X + before) / 2
     return X, g, (), f"The simulation cannot be made, also after {HALVINGS} halved steps: {reason}"
 
 
-def _swings(changes: Sequence[float]) -> bool:
-    """Whether three changes hardly shrink: the passes overshoot, and half of a step goes further."""
-    return len(changes) == 3 and changes[2] > SWING * changes[1] > SWING**2 * changes[0]
+def _accelerated(points: Sequence[Array], steps: Sequence[Array], size: Array) -> Array:
+    """The next X from the last ones and the steps that were found there; distances in units of `size`, shape (c,)."""
+    if len(points) < 3:
+        return np.asarray(points[-1] + steps[-1])
+    dX, dF = np.diff(np.array(points), axis=0).T, np.diff(np.array(steps), axis=0).T
+    gamma = np.linalg.lstsq(dF / size[:, None], steps[-1] / size, rcond=1e-6)[0]
+    return np.asarray(points[-1] + steps[-1] - (dX + dF) @ gamma)
 
 
 def _contraction(changes: Sequence[float]) -> float:
