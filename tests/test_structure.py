@@ -38,7 +38,10 @@ ONLY_IN = {  # library: files and folders that may import it
     "threadpoolctl": ("runtime/studies/distributed.py",),
     "scipy": ("runtime/",),
 }
-LAZY = {"runtime.io.records": {"runtime.io.datasets"}}  # pooch and its requests are loaded only for a dataset
+LAZY = {  # pooch and its requests are loaded only for a dataset, numpy only for a URDF
+    "runtime.io.records": {"runtime.io.datasets"},
+    "symgen.description.files": {"symgen.description.urdf"},
+}
 FORBIDDEN_CALLS = {"eval", "exec", "sympify", "parse_expr", "__import__"}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,13 +14,23 @@ from symgen.cli.writing import write_all
 if TYPE_CHECKING:
     from symgen.description import Robot
 
-SUFFIXES = (".yaml", ".yml", ".par")
+SUFFIXES = (".yaml", ".yml", ".par", ".urdf")
 
 
 def convert(
-    source: Annotated[str, typer.Argument(metavar="IN", help="Packaged robot, or a file: .yaml, .par.")],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; its suffix names the format: .yaml, .par.")],
+    source: Annotated[str, typer.Argument(metavar="IN", help="Packaged robot, or a file: .yaml, .par, .urdf.")],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; its suffix names the format: .yaml, .par, .urdf.")],
     constant: Annotated[list[str] | None, typer.Option(help="Value of a symbol of a .par file, D3=0.45 (SI, rad); repeat.")] = None,
+    snap: Annotated[
+        float,
+        typer.Option(
+            min=0, max=0.1, help="Angles of a URDF this close (rad) to a multiple of pi/12 become that: 1e-4 reads 1.5708 as pi/2."
+        ),
+    ] = 0.0,
+    values: Annotated[
+        Path | None,
+        typer.Option(help="Standard parameters for OUT: a CSV of name,value, as standard_parameters.csv of a feasible estimate."),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Write the robot IN in the format of OUT, and say what was read otherwise than written and what OUT does not carry.
@@ -33,7 +44,9 @@ def convert(
             fail(f"{output} exists already; choose another name or add --force")
         from symgen.description import read_robot
 
-        robot, read = read_robot(source, constants=dict(map(_constant, constant or ())))
+        robot, read = read_robot(source, constants=dict(map(_constant, constant or ())), nearly=snap)
+        if values is not None:
+            robot = replace(robot, values={**robot.values, **_values(values)})
         text, written = _text(robot, output, read)
         write_all(output.parent, {output.name: text})
         typer.echo(f"{output}: {robot.name}, {len(robot.joints)} joints, {len(robot.parameters)} standard parameters")
@@ -54,10 +67,30 @@ def _constant(text: str) -> tuple[str, float]:
         fail(f"--constant {text}; expected NAME=NUMBER")
 
 
+def _values(file: Path) -> dict[str, float]:
+    """name,value rows of a CSV; the header may be there."""
+    import csv
+
+    found: dict[str, float] = {}
+    with file.open(encoding="utf-8", newline="") as stream:
+        for line, row in enumerate(csv.reader(stream), start=1):
+            if row in ([], ["name", "value"]):
+                continue
+            try:
+                name, value = row
+                found[name] = float(value)
+            except ValueError:
+                fail(f"{file}, line {line}: found {','.join(row)[:60]!r}; expected name,value")
+    return found
+
+
 def _text(robot: Robot, output: Path, read: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
     """Text of the file and what it does not carry."""
     from symgen.description import write_par, write_yaml
+    from symgen.description.urdf_write import write_urdf
 
+    if output.suffix.lower() == ".urdf":
+        return write_urdf(robot)
     if output.suffix.lower() == ".par":
         return write_par(robot)
     return write_yaml(robot, comments=[f"Converted from {robot.file}.", *read]), ()

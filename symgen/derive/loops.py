@@ -108,7 +108,7 @@ class LoopEquations:
             (A, P), (B, Q) = pose[loop_k.cut], pose[loop_k.twin]
             rows += [(P[k] - Q[k]) / self.length for k in range(3)]
             rows += [A[k][m] - B[k][m] for k in range(3) for m in range(3)]
-        return np.array([np.broadcast_to(np.asarray(x, dtype=float), shape) for x in rows])
+        return np.array([np.broadcast_to(np.asarray(x, dtype=float), shape) for x in rows]).reshape(len(rows), *shape)
 
     def linearised(self, q: Mapping[int, float]) -> tuple[Array, Array]:
         """residual (equations,) and, by central differences, d residual / d free joints (equations, free)."""

@@ -34,10 +34,10 @@ def load_robot(source: str | Path) -> Robot:
     return read_robot(source)[0]
 
 
-def read_robot(source: str | Path, *, constants: Mapping[str, float] | None = None) -> tuple[Robot, tuple[str, ...]]:
+def read_robot(source: str | Path, *, constants: Mapping[str, float] | None = None, nearly: float = 0.0) -> tuple[Robot, tuple[str, ...]]:
     """As `load_robot`, with notes on what of a foreign format was read otherwise than written, or not at all.
 
-    constants : values of the symbols of a `.par` file, which has no place for them.
+    constants : values of the symbols of a `.par` file, which has no place for them.   nearly : rad, as `read_urdf`.
     """
     if source in packaged_robots():
         file = f"{source}.yaml"
@@ -46,6 +46,10 @@ def read_robot(source: str | Path, *, constants: Mapping[str, float] | None = No
     content = _read(path)
     if path.suffix.lower() == ".par":
         return read_par(content, path.name, constants)
+    if path.suffix.lower() == ".urdf":
+        from symgen.description.urdf import read_urdf  # numpy, which robot files do without
+
+        return read_urdf(content, path.name, nearly=nearly)
     return parse_robot(content, path.name), ()
 
 

@@ -63,3 +63,48 @@ def test_constants_of_a_foreign_file(tmp_path):
     options = [part for name in names for part in ("--constant", f"{name}=3/2")]
     assert run("convert", file, tmp_path / "arm.yaml", *options).exit_code == 0
     assert set(load_robot(tmp_path / "arm.yaml").constants.values()) == {1.5}
+
+
+ARM = """\
+<robot name="arm"><link name="base"/>
+<link name="a"><inertial><origin xyz="0.1 0 0.05"/><mass value="2"/>
+<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.015"/></inertial></link>
+<link name="b"><inertial><origin xyz="0 0.1 0"/><mass value="1"/>
+<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.015"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/><dynamics damping="0.3"/>
+<limit lower="-1" upper="1" velocity="2" effort="30"/></joint>
+<joint name="elbow" type="continuous"><parent link="a"/><child link="b"/><origin xyz="0.4 0 0" rpy="1.5708 0 0"/><axis xyz="0 0 1"/>
+<limit velocity="2" effort="30"/></joint>
+</robot>
+"""
+
+
+def test_urdf_and_back(tmp_path):
+    file, table, again = tmp_path / "arm.urdf", tmp_path / "arm.yaml", tmp_path / "again.urdf"
+    file.write_text(ARM)
+    result = run("convert", file, table, "--snap", "1e-4")
+    assert result.exit_code == 0 and "q1 = 'shoulder', q2 = 'elbow'" in result.stdout and "limits of q left out" in result.stdout
+    robot = load_robot(table)
+    assert str(robot.frame(2).alpha) == "pi/2" and robot.values["FV1"] == 0.3 and robot.values["M1"] == 2
+    assert str(load_robot(file).frame(2).alpha) == "1.5708"
+    result = run("convert", table, again)
+    assert result.exit_code == 0 and "formulas are not carried" in result.stdout
+    assert load_robot(again).values == pytest.approx(robot.values, abs=1e-12)
+
+
+def test_values_of_an_estimate_go_into_the_urdf(tmp_path):
+    file, csv = tmp_path / "arm.urdf", tmp_path / "standard_parameters.csv"
+    file.write_text(ARM)
+    csv.write_text("name,value\nM2,1.25\nFS2,0.5\n")
+    assert run("convert", file, tmp_path / "new.urdf", "--values", csv).exit_code == 0
+    values = load_robot(tmp_path / "new.urdf").values
+    assert values["M2"] == 1.25 and values["FS2"] == 0.5 and values["FV1"] == 0.3
+    csv.write_text("M2,heavy\n")
+    result = run("convert", file, tmp_path / "bad.urdf", "--values", csv)
+    assert result.exit_code == 2 and "line 1" in result.stderr and not (tmp_path / "bad.urdf").exists()
+
+
+@pytest.mark.parametrize(("robot", "words"), [("sr400", "closed loop"), ("rx90", "no value of")])
+def test_what_a_urdf_cannot_hold_is_refused(robot, words, tmp_path):
+    result = run("convert", robot, tmp_path / "robot.urdf")
+    assert result.exit_code == 2 and words in result.stderr and list(tmp_path.iterdir()) == []

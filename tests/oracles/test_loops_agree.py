@@ -20,10 +20,10 @@ from oracles.random_parallelograms import SEEDS, random_parallelogram
 from oracles.random_robots import random_parameters
 from symgen.derive.lagrange import Lagrange
 from symgen.derive.loops import close as close_loops
+from symgen.description import load_robot
 from symgen.description.expression import Expression
 from symgen.description.grammar import parse
 from symgen.description.robot import REVOLUTE, Robot
-from symgen.description import load_robot
 from symgen.emit.render import render
 from symgen.emit.spec import module_spec
 from symgen.regroup.certificate import certify

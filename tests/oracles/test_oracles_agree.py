@@ -12,8 +12,8 @@ from oracles.named_robots import four_bar, planar_2r, six_r
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import describe_mix, random_parameters, random_robot, random_state
 from symgen.derive.lagrange import Lagrange, numeric_regressor
-from symgen.description.robot import Robot
 from symgen.description import load_robot, packaged_robots
+from symgen.description.robot import Robot
 from symgen.errors import DescriptionError
 
 PACKAGED = [robot for robot in map(load_robot, packaged_robots()) if not robot.passive]

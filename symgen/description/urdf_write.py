@@ -1,0 +1,176 @@
+"""URDF of a Robot with values: one link and one joint per frame, z axes, link frames those of Khalil; with notes on what is not carried.
+
+The joint frame is iTj at q_j = 0 as x y z and roll, pitch, yaw. Inertials are about the centre of mass, c = MS / M:
+I = J - M (c'c 1 - c c').
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from symgen.description.expression import ONE, Expression
+from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, parameter
+from symgen.description.urdf_text import Array, turn
+from symgen.errors import DescriptionError
+
+UNLIMITED = 1e9  # where a URDF asks for a limit that the robot does not have
+_TYPES = {REVOLUTE: "revolute", PRISMATIC: "prismatic", FIXED: "fixed"}
+_CARRIED = {"FV": ("viscous", "damping"), "FS": ("coulomb", "friction")}
+
+
+def write_urdf(robot: Robot, values: Mapping[str, float] | None = None) -> tuple[str, tuple[str, ...]]:
+    """Text of the URDF, and what of `robot` it does not carry.
+
+    Parameters
+    ----------
+    robot : without loops; passive joints follow one joint each.
+    values : standard parameters by name, those of the robot file if None. A URDF holds masses, so they must be those of a physical robot:
+        of a feasible estimate, or CAD.
+
+    Raises
+    ------
+    DescriptionError : loops, relations of several joints, inertial parameters without value, moments without mass.
+    """
+    values = dict(robot.values if values is None else values)
+    if robot.loops:
+        raise DescriptionError(
+            f"{robot.name}: a URDF is a tree; this robot has {len(robot.loops)} closed loop{'s' * (len(robot.loops) > 1)}"
+        )
+    if missing := [name for j in robot.links for p in INERTIAL if (name := parameter(p, j)) not in values]:
+        raise DescriptionError(f"{robot.name}: no value of {', '.join(missing[:12])}{' ...' * (len(missing) > 12)}; add them under values")
+    lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(robot.name)}>", '  <link name="link0"/>']
+    for f in robot.frames:
+        lines += _link(robot, f.j, values) + _joint(robot, f, values)
+    return "\n".join([*lines, "</robot>"]) + "\n", _losses(robot, values)
+
+
+def _attributes(**numbers: float) -> str:
+    return " ".join(f'{key}="{float(x) + 0.0!r}"' for key, x in numbers.items())
+
+
+def _link(robot: Robot, j: int, values: Mapping[str, float]) -> list[str]:
+    standard = [values[parameter(p, j)] for p in INERTIAL] if j in robot.links else []
+    if not any(standard):
+        return [f'  <link name="link{j}"/>']
+    *J, mx, my, mz, M = standard
+    if M <= 0:
+        raise DescriptionError(f"{robot.name}: M{j} = {M} with other moments; no mass has these. Export a physically feasible estimate")
+    c = np.array([mx, my, mz]) / M
+    I = np.zeros((3, 3))
+    I[np.triu_indices(3)] = J
+    I -= M * (c @ c * np.eye(3) - np.outer(c, c))
+    inertia = dict(zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), I[np.triu_indices(3)], strict=True))
+    return [
+        f'  <link name="link{j}">',
+        "    <inertial>",
+        f'      <origin xyz="{_numbers(c)}" rpy="0 0 0"/>',
+        f"      <mass {_attributes(value=M)}/>",
+        f"      <inertia {_attributes(**inertia)}/>",
+        "    </inertial>",
+        "  </link>",
+    ]
+
+
+def _numbers(row: Array) -> str:
+    return " ".join(repr(float(x) + 0.0) for x in row)
+
+
+def _joint(robot: Robot, f: Frame, values: Mapping[str, float]) -> list[str]:
+    T = _placement(robot, f)
+    lines = [
+        f'  <joint name="q{f.j}" type="{_kind(robot, f)}">',
+        f'    <parent link="link{f.ant}"/>',
+        f'    <child link="link{f.j}"/>',
+        f'    <origin xyz="{_numbers(T[:3, 3])}" rpy="{_numbers(_roll_pitch_yaw(T[:3, :3]))}"/>',
+    ]
+    if f.sigma == FIXED:
+        return [*lines, "  </joint>"]
+    lines += ['    <axis xyz="0 0 1"/>', f"    <limit {_attributes(**_limit(robot, f))}/>"]
+    dynamics = {
+        there: values[name] for family, (_, there) in _CARRIED.items() if (name := parameter(family, f.j)) in _plain(robot) & set(values)
+    }
+    if dynamics:
+        lines.append(f"    <dynamics {_attributes(**dynamics)}/>")
+    if f.j in robot.constraints:
+        leader, multiplier, offset = _follows(robot, f.j)
+        lines.append(f'    <mimic joint="q{leader}" {_attributes(multiplier=multiplier, offset=offset)}/>')
+    return [*lines, "  </joint>"]
+
+
+def _kind(robot: Robot, f: Frame) -> str:
+    return "continuous" if f.sigma == REVOLUTE and "lower" not in _limit(robot, f) else _TYPES[f.sigma]
+
+
+def _limit(robot: Robot, f: Frame) -> dict[str, float]:
+    k = robot.joints.index(f.j) if f.mu else None
+    row = {key: robot.limits[key][k] for key in ("q", "qd", "tau") if k is not None and key in robot.limits}
+    bounds: dict[str, float] = {}
+    if isinstance(ends := row.get("q"), tuple):
+        bounds = {"lower": ends[0], "upper": ends[1]}
+    elif f.sigma == PRISMATIC:
+        bounds = {"lower": -UNLIMITED, "upper": UNLIMITED}
+    largest = {there: row.get(here, UNLIMITED) for here, there in (("qd", "velocity"), ("tau", "effort"))}
+    return bounds | {key: x for key, x in largest.items() if not isinstance(x, tuple)}
+
+
+def _follows(robot: Robot, j: int) -> tuple[int, float, float]:
+    """q_j = multiplier q_i + offset; DescriptionError where it depends on several joints."""
+    e = robot.constraints[j]
+    leaders = [i for i in robot.moving if f"q{i}" in e.symbols]
+    factor = e.coefficient(f"q{leaders[0]}") if len(leaders) == 1 else None
+    if factor is None or (e - factor * Expression.symbol(f"q{leaders[0]}")).symbols & {f"q{leaders[0]}"}:
+        raise DescriptionError(f"{robot.name}: q{j} = {e}; in a URDF a joint follows one other, multiplier and offset")
+    rest = e - factor * Expression.symbol(f"q{leaders[0]}")
+    return leaders[0], factor.value(robot.constants), rest.value(robot.constants)
+
+
+def _placement(robot: Robot, f: Frame) -> Array:
+    """iTj at q_j = 0, (4, 4)."""
+    T = np.eye(4)
+    for axis, angle, shift in ((2, f.gamma, f.b), (0, f.alpha, f.d), (2, f.theta0, f.r0)):
+        step = np.eye(4)
+        step[:3, :3], step[axis, 3] = turn(axis, angle.value(robot.constants)), shift.value(robot.constants)
+        T = T @ step
+    return T
+
+
+def _roll_pitch_yaw(R: Array) -> Array:
+    """R = Rz(yaw) Ry(pitch) Rx(roll); roll is read off what yaw and pitch leave, so that it is exact at pitch = +-pi/2 too."""
+    c = math.hypot(R[0, 0], R[1, 0])
+    yaw = math.atan2(R[1, 0], R[0, 0]) if c > 1e-12 else 0.0
+    pitch = math.atan2(-R[2, 0], c)
+    rest = turn(1, pitch).T @ turn(2, yaw).T @ R
+    return np.array([math.atan2(rest[2, 1], rest[1, 1]), pitch, yaw])
+
+
+def _plain(robot: Robot) -> set[str]:
+    """Friction parameters of one joint alone, which <dynamics> holds."""
+    return {
+        parameter(e.family, j)
+        for e in robot.elements
+        if e.family in _CARRIED and e.kind == _CARRIED[e.family][0] and e.when is None
+        for j, row in e.along.items()
+        if row == {j: ONE}
+    }
+
+
+def _losses(robot: Robot, values: Mapping[str, float]) -> tuple[str, ...]:
+    inertial = {parameter(p, j) for j in robot.links for p in INERTIAL}
+    lost = [name for name in robot.parameters if name not in inertial | _plain(robot)]
+    notes = []
+    if dropped := [name for name in lost if values.get(name, 0.0)]:
+        notes.append(f"values without a place in a URDF, left out: {', '.join(dropped)}")
+    if unknown := [name for name in lost if name not in values]:
+        notes.append(f"parameters without a place or value: {', '.join(unknown)}")
+    notes.append("constants as numbers, frames as placements: formulas are not carried")
+    gravity = tuple(e.value(robot.constants) for e in robot.gravity)
+    if gravity[:2] != (0.0, 0.0) or gravity[2] >= 0:
+        notes.append(f"gravity {gravity} m/s^2: a URDF has none, programs assume -z of the root link")
+    notes += [f"{what} not carried" for what in ("title", "source", "drives") if getattr(robot, what)]
+    if absent := [key for key in ("q", "qd", "tau") if key not in robot.limits]:
+        notes.append(f"no limits of {', '.join(absent)}: written as continuous or {UNLIMITED:g}")
+    return tuple(notes)

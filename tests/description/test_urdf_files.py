@@ -1,0 +1,140 @@
+"""URDF: faults are errors with their line, hostile files are refused before they cost anything, mangled ones raise nothing else."""
+
+import re
+import time
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from oracles.urdf_robots import panda, ur5
+from symgen.description import Robot, load_robot, parse
+from symgen.description.urdf import read_urdf
+from symgen.description.urdf_text import MAX_BYTES
+from symgen.description.urdf_write import write_urdf
+from symgen.errors import DescriptionError
+
+ARM = """\
+<robot name="my arm">
+<link name="base"/>
+<link name="a"><inertial><mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+<visual><geometry><mesh filename="package://../../../etc/passwd"/></geometry></visual></link>
+<link name="b"/>
+<joint name="s" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 2"/></joint>
+<joint name="e" type="prismatic"><parent link="a"/><child link="b"/><origin xyz="0.4 0 0"/><axis xyz="1 0 0"/></joint>
+<gazebo/><transmission/>
+</robot>
+"""
+
+
+def error_of(text):
+    with pytest.raises(DescriptionError) as caught:
+        read_urdf(text if isinstance(text, bytes) else text.encode(), "arm.urdf")
+    assert caught.value.file == "arm.urdf" and caught.value.line is not None
+    return caught.value
+
+
+def test_what_is_not_read_is_noted():
+    robot, notes = read_urdf(ARM.encode(), "arm.urdf")
+    assert robot.name == "my_arm" and [f.sigma for f in robot.frames] == [0, 1]
+    assert notes[0] == "joints: q1 = 's', q2 = 'e'" and "<gazebo>, <transmission>" in notes[1]
+    assert any("values of link 2 are 0" in note for note in notes) and robot.values["ZZ1"] == 1 and robot.values["M2"] == 0
+
+
+WRONG = [
+    ("<robot", "<sdf", 9, "mismatched tag"),
+    ('<link name="b"/>', '<link name="a"/>', 5, "given twice"),
+    ('<link name="b"/>', '<link nome="b"/>', 5, "has no name"),
+    ('<link name="b"/>', '<link name="b"/><link name="c"/>', 1, "links without parent"),
+    ('type="revolute"', 'type="floating"', 6, "'floating'"),
+    ('xyz="0 0 2"', 'xyz="0 0 0"', 6, "no direction"),
+    ('xyz="0 0 2"', 'xyz="0 2"', 6, "expected 3 numbers"),
+    ('xyz="0 0 2"', 'xyz="0 0 nan"', 6, "expected 3 numbers"),
+    ('xyz="0 0 2"', 'xyz="0 0 1e999"', 6, "expected 3 numbers"),
+    ('<mass value="2"/>', "", 3, "<mass> and <inertia>"),
+    ('value="2"', 'value="-2"', 3, "0 or more"),
+    ('<child link="b"/>', '<child link="z"/>', 7, "no link 'z'"),
+    ('<child link="b"/>', '<child link="a"/>', 7, "has a parent already"),
+    ('<parent link="base"/>', "", 6, "needs <parent"),
+    ('<joint name="e"', '<joint name="s"', 7, "given twice"),
+    ('<parent link="base"/>', '<parent link="b"/>', 1, "do not hang"),
+    ('<axis xyz="1 0 0"/>', '<mimic joint="e"/>', 7, "in a circle"),
+    ('<axis xyz="1 0 0"/>', '<mimic joint="x"/>', 7, "no moving joint 'x'"),
+    ("<gazebo/>", '<xacro:include filename="x"/>', 8, "xacro"),
+    ("</robot>", "", 10, "no element found"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "line", "words"), WRONG)
+def test_faults_are_errors_with_their_line(old, new, line, words):
+    assert old in ARM
+    error = error_of(ARM.replace(old, new, 1))
+    assert words in error.message and error.line == line
+
+
+BOMB = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "' + "&a;" * 50 + '"><!ENTITY c "' + "&b;" * 50 + '">]>'
+HOSTILE = {
+    "expanding entities": BOMB + ARM.replace("my arm", "&c;"),
+    "external entity": '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]>' + ARM.replace("my arm", "&a;"),
+    "external document type": '<!DOCTYPE x SYSTEM "http://localhost/x.dtd">' + ARM,
+    "nesting": "<robot>" + "<a>" * 100_000,
+    "many elements": "<robot>" + "<a/>" * 200_000 + "</robot>",
+    "many joints": '<robot><link name="l0"/>'
+    + "".join(
+        f'<link name="l{k}"/><joint name="j{k}" type="fixed"><parent link="l{k - 1}"/><child link="l{k}"/></joint>' for k in range(1, 300)
+    )
+    + "</robot>",
+    "size": " " * (MAX_BYTES + 1),
+    "encoding": b'<?xml version="1.0" encoding="no-such"?><robot/>',
+    "empty": "",
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_files_are_refused(kind):
+    start = time.process_time()
+    error_of(HOSTILE[kind])
+    assert time.process_time() - start < 5  # the contract of issue 6: no hang above 5 s
+
+
+def test_hostile_names_become_an_identifier():
+    for name in ("1;import os", "class", "é'\\\"*/", "x" * 500, ""):
+        text = ARM.replace("my arm", name.replace('"', "&quot;"))
+        robot, notes = read_urdf(text.encode(), "arm.urdf")
+        assert re.fullmatch(r"[A-Za-z]\w{0,39}", robot.name, re.ASCII) and "\n" not in "".join(notes)
+
+
+def test_mimic_becomes_a_relation():
+    robot, _ = read_urdf(panda().encode(), "panda.urdf")
+    assert {j: str(e) for j, e in robot.constraints.items()} == {9: "q8"} and 9 not in robot.joints
+    assert '<mimic joint="q8" multiplier="1.0" offset="0.0"/>' in write_urdf(robot)[0]
+
+
+def test_serial_arms_have_no_gamma_nor_b():
+    robot, _ = read_urdf(ur5().encode(), "ur5.urdf")
+    assert all(not f.gamma and not f.b for f in robot.frames[1:]) and robot.frames[1].alpha in (parse("pi/2"), parse("-pi/2"))
+
+
+def test_export_needs_masses():
+    robot = load_robot("planar_2r")
+    moments = dict.fromkeys(robot.parameters, 0.0) | {"MX1": 1.0}
+    with pytest.raises(DescriptionError, match="M1 = 0"):
+        write_urdf(robot, moments)
+
+
+def test_equal_lengths_are_one_constant():
+    robot: Robot = read_urdf(panda().encode(), "panda.urdf")[0]
+    assert str(robot.frame(4).d).lstrip("-") == str(robot.frame(5).d).lstrip("-") == "D4"
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_mangled_files_raise_nothing_else(data):
+    text = ARM
+    for _ in range(data.draw(st.integers(1, 4))):
+        at, length = data.draw(st.integers(0, len(text))), data.draw(st.integers(0, 12))
+        text = text[:at] + data.draw(st.text(alphabet="<>/=\"' 0123456789.e-&;!x\n\x00é", max_size=8)) + text[at + length :]
+    try:
+        read_urdf(text.encode("utf-8", "surrogatepass"), "arm.urdf")
+    except DescriptionError as error:
+        assert re.search(r"\(arm\.urdf, line \d+\)$", str(error))
