@@ -6,11 +6,12 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import TypeVar
 
+from symgen.description.distal import khalil_frames
 from symgen.description.expression import ONE, Expression
 from symgen.description.forms import form_of, row_of
 from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, Drives, Element, Form, Frame, Loop, Path, Robot, Row
-from symgen.description.schema import DrivesTable, ElementTable, FrameRow, RobotFile
+from symgen.description.schema import CONVENTIONS, DrivesTable, ElementTable, FrameRow, RobotFile
 from symgen.errors import DescriptionError, ExpressionError
 
 T = TypeVar("T")
@@ -22,6 +23,14 @@ def build(table: RobotFile, *, file: str, sha256: str) -> Robot:
     joints = {j for j, row in table.frames.items() if row.sigma != FIXED}
     variables = constants | {f"q{j}" for j in (*joints, *range(1, len(table.frames) + 1))}
     frames = tuple(_frame(j, row, constants, variables) for j, row in sorted(table.frames.items()))
+    massless = set(table.massless)
+    if table.convention not in CONVENTIONS:
+        raise DescriptionError(f"convention: found {table.convention!r}; expected {' or '.join(CONVENTIONS)}", path=("convention",))
+    if table.convention == "distal":
+        if table.loops:
+            raise DescriptionError("loops: cut frames of a distal table have no place; write it by Khalil's convention", path=("loops",))
+        frames = khalil_frames(frames)
+        massless |= {f.j for f in frames[len(table.frames) :]}
     actuated = tuple(f.j for f in frames if f.mu)
     gx, gy, gz = (_read(text, constants, ("gravity", k)) for k, text in enumerate(table.gravity))
     for k, j in enumerate(table.massless):
@@ -40,7 +49,7 @@ def build(table: RobotFile, *, file: str, sha256: str) -> Robot:
             for k, row in enumerate(table.loops)
         ),
         constraints={_joint(q, ("constraints", q)): _read(text, variables, ("constraints", q)) for q, text in table.constraints.items()},
-        massless=frozenset(table.massless),
+        massless=frozenset(massless),
         drives=None if table.drives is None else _drives(table.drives, len(actuated)),
         limits={name: tuple(row) for name in ("q", "qd", "qdd", "tau") if (row := getattr(table.limits, name)) is not None},
         values=table.values,

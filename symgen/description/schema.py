@@ -17,6 +17,7 @@ from symgen.description.robot import DIRECTIONS, KINDS, Path
 from symgen.errors import ExpressionError
 
 SCHEMA = 1  # version of the robot file
+CONVENTIONS = ("proximal", "distal")
 
 
 def _symbolic(value: Any) -> str:
@@ -115,6 +116,11 @@ class RobotFile(_Table):
     source: str = ""
     gravity: list[Symbolic] = Field(description="acceleration of gravity in frame 0: [0, 0, -g]", min_length=3, max_length=3)
     constants: dict[str, Number] = {}
+    convention: str = Field(
+        default="proximal",
+        description="proximal: Khalil and Kleinfinger; distal: classic DH, with its a as d and its d as r",
+        json_schema_extra={"enum": list(CONVENTIONS)},
+    )
     frames: dict[int, FrameRow] = Field(description="1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}")
     loops: list[LoopRow] = []
     constraints: dict[str, Symbolic] = Field(default={}, description="passive joints: {q3: q5 - q2 + pi}")
