@@ -28,9 +28,16 @@ PIPES = (  # Chromium reads commands on descriptor 3 and writes answers on 4
 )
 
 
-def find_browser() -> str | None:
-    """Path of a Chromium on this machine."""
-    return next(filter(None, map(shutil.which, NAMES)), None)
+class BrowserError(Exception):
+    """There is no browser, or it does not do what it is told."""
+
+
+def find_browser() -> str:
+    """Path of a Chromium on this machine. Raises BrowserError."""
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        raise BrowserError(f"none of {', '.join(NAMES)} is on PATH")
+    return found
 
 
 class Browser:
@@ -49,6 +56,13 @@ class Browser:
         os.close(answers)
         self._buffer, self._id, self._session = b"", 0, ""
         self.events: list[dict[str, Any]] = []
+        try:
+            self._attach()
+        except BrowserError:
+            self.__exit__()
+            raise
+
+    def _attach(self) -> None:
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
@@ -71,12 +85,15 @@ class Browser:
         """Send a command and wait for its answer; events on the way are kept."""
         self._id += 1
         message = {"id": self._id, "method": method, "params": parameters} | ({"sessionId": self._session} if self._session else {})
-        os.write(self._send, json.dumps(message).encode() + b"\0")
+        try:
+            os.write(self._send, json.dumps(message).encode() + b"\0")
+        except BrokenPipeError as e:
+            raise BrowserError("the browser ended") from e
         while True:
             answer = self._next()
             if answer.get("id") == self._id:
                 if "error" in answer:
-                    raise RuntimeError(f"{method}: {answer['error']}")
+                    raise BrowserError(f"{method}: {answer['error']}")
                 return answer["result"]
             self.events.append(answer)
 
@@ -84,10 +101,10 @@ class Browser:
         end = time.monotonic() + self.timeout
         while b"\0" not in self._buffer:
             if not select.select([self._receive], [], [], max(0.0, end - time.monotonic()))[0]:
-                raise TimeoutError(f"the browser said nothing for {self.timeout} s")
+                raise BrowserError(f"the browser said nothing for {self.timeout} s")
             part = os.read(self._receive, 1 << 20)
             if not part:
-                raise RuntimeError("the browser ended")
+                raise BrowserError("the browser ended")
             self._buffer += part
         message, _, self._buffer = self._buffer.partition(b"\0")
         return json.loads(message)
@@ -107,7 +124,7 @@ class Browser:
         """Value of a JavaScript expression, as JSON."""
         result = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in result:
-            raise RuntimeError(result["exceptionDetails"])
+            raise BrowserError(result["exceptionDetails"])
         return result["result"].get("value")
 
     def centre(self, selector: str) -> tuple[float, float]:

@@ -4,9 +4,9 @@
   const robot = JSON.parse(document.getElementById("robot").textContent);
   const by = (id) => document.getElementById(id);
   const start = () => closeLoops(robot, { ...robot.tied, ...Object.fromEntries(robot.joints.map((joint) => [joint.j, joint.start])) });
-  const degrees = (angle) => `${((angle * 180) / Math.PI).toFixed(1)}°`;
+  const degrees = (angle) => `${plain((angle * 180) / Math.PI, 1)}°`;
   const slides = (j) => robot.frames[j - 1].sigma === 1;
-  const told = (j, value) => (slides(j) ? `${value.toFixed(3)} m` : degrees(value));
+  const told = (j, value) => (slides(j) ? `${plain(value, 3)} m` : degrees(value));
 
   let independent = start();
   if (!independent) {
@@ -21,7 +21,7 @@
     drawing.draw(pose);
     for (const joint of robot.joints) {
       by(`q${joint.j}`).value = q[joint.j];
-      by(`q${joint.j}`).setAttribute("aria-valuetext", slides(joint.j) ? `${q[joint.j].toFixed(3)} metres` : `${degrees(q[joint.j]).slice(0, -1)} degrees`);
+      by(`q${joint.j}`).setAttribute("aria-valuetext", slides(joint.j) ? `${q[joint.j].toFixed(3)} metres` : `${((q[joint.j] * 180) / Math.PI).toFixed(1)} degrees`);
     }
     for (const [j, value] of Object.entries(q)) by(`at${j}`).textContent = told(j, value);
     for (const row of by("poses").rows) {

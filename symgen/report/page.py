@@ -142,11 +142,16 @@ def _formulas(spec: ModuleSpec) -> list[dict[str, Any]]:
             "symbol": mathml.math(mathml.parameter(b.name)),
             "terms": mathml.formula(b.combination) if b.name != b.own else [],
             "text": b.formula,
-            "unit": unit(robot, b.own).replace("**2", "²").replace("*", " "),
+            "unit": printed(unit(robot, b.own)),
             "joints": [(j, entered) for j, entered in zip(robot.joints, spec.structure[k], strict=True)],
         }
         for k, b in enumerate(spec.regrouping.base)
     ]
+
+
+def printed(text: str) -> str:
+    """kg*m**2 as kg m²."""
+    return text.replace("**2", "²").replace("*", " ")
 
 
 def _places(found: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
@@ -172,7 +177,15 @@ def _pointed_at(spec: ModuleSpec, found: Sequence[Effect]) -> Mapping[str, Any]:
     robot = spec.robot
     by_name = {e.name: e for e in found}
     told: dict[str, Any] = {
-        e.name: {"text": e.meaning, "unit": e.unit, "place": e.place, "link": e.link, "base": e.base, "joints": e.joints, "why": e.why}
+        e.name: {
+            "text": e.meaning,
+            "unit": printed(e.unit),
+            "place": e.place,
+            "link": e.link,
+            "base": e.base,
+            "joints": e.joints,
+            "why": e.why,
+        }
         for e in found
     }
     for k, b in enumerate(spec.regrouping.base):
@@ -180,7 +193,7 @@ def _pointed_at(spec: ModuleSpec, found: Sequence[Effect]) -> Mapping[str, Any]:
         absorbed = [name for name in b.combination if name != b.own or b.combination[name] != ONE]
         told[b.name] = {
             "text": own.meaning + (f"; takes in {', '.join(absorbed)}" if absorbed else ""),
-            "unit": own.unit,
+            "unit": printed(own.unit),
             "place": own.place,
             "link": own.link,
             "base": [b.name],

@@ -1,0 +1,144 @@
+"""The page of a robot in headless Chromium: sliders, keys, pointer, narrow windows; positions against the emitted modules."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import Browser, BrowserError, find_browser
+
+from runtime.model import load_model
+from symgen.description import load_robot
+from symgen.regroup.regrouping import regroup
+from symgen.report.page import robot_page
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+ROBOTS = ("tx40", "haptic", "scara", "four_bar")
+POSES = """[...document.querySelectorAll('#poses tr')].map(r => [1, 2, 3].map(k => Number(r.cells[k].dataset.value)))"""
+SET = "(() => {{ const s = document.getElementById('q{}'); s.value = {}; s.dispatchEvent(new Event('input')); return Number(s.value); }})()"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    try:
+        started = Browser(find_browser())
+    except BrowserError as e:
+        if os.environ.get("SYMGEN_REQUIRE_BROWSER") == "1":
+            pytest.fail(f"SYMGEN_REQUIRE_BROWSER=1 but {e}")
+        pytest.skip(f"{e}; install chromium to run the tests in a browser")
+    with started as b:
+        yield b
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+    for name in ROBOTS:
+        (folder / f"{name}.html").write_text(robot_page(regroup(load_robot(name))), encoding="utf-8")
+    return {name: folder / f"{name}.html" for name in ROBOTS}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_nothing_complains_and_nothing_scrolls_sideways(browser, files, name):
+    for width in (1280, 390):
+        browser.open(files[name], width)
+        assert browser.complaints == []
+        assert browser.requests == [files[name].as_uri()]
+        assert browser.run("document.documentElement.scrollWidth <= window.innerWidth && window.innerWidth") == width
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_sliders_move_the_frames_as_the_module_does(browser, files, name):
+    """Origins of all frames, from the page and from `frame_poses` of the emitted module, which shares no code with it."""
+    model = load_model(GENERATED / f"{name}.py")
+    browser.open(files[name])
+    before = browser.run("document.querySelector('#view svg').innerHTML")
+    joints = browser.run("JSON.parse(document.getElementById('robot').textContent).joints")
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        q = [browser.run(SET.format(j["j"], j["low"] + rng.uniform(0.2, 0.8) * (j["high"] - j["low"]))) for j in joints]
+        expected = np.asarray(model.frame_poses(np.array([q])))[0, :, :3, 3]
+        np.testing.assert_allclose(browser.run(POSES), expected, atol=1e-6)  # the slider gives its position with about 7 digits
+    assert browser.run("document.querySelector('#view svg').innerHTML") != before
+    assert browser.complaints == []
+
+
+def test_loop_that_cannot_close_stays_closed(browser, files):
+    """The rocker of a longer crank: lengths changed in the page's own functions, so that the linkage has dead points."""
+    browser.open(files["four_bar"])
+    result = browser.run(
+        "(() => { const r = JSON.parse(document.getElementById('robot').textContent); r.frames[1].d = 0.49;"
+        " const s = closeLoops(r, { ...r.tied, 1: 1 }); const m = moved(r, s, 1, 3.1, 0.05);"
+        " return [m.open, m.q[1], Math.max(...gaps(r, m.q).map(Math.abs))]; })()"
+    )
+    assert result[0] is True and 1 < result[1] < 3.1 and result[2] < 1e-7
+
+
+def test_keyboard(browser, files):
+    browser.open(files["scara"])
+    drawing = "document.querySelector('#view svg').innerHTML"
+    browser.run("document.getElementById('view').focus()")
+    seen = [browser.run(drawing)]
+    for key in ("ArrowLeft", "ArrowUp", "+", "0"):
+        browser.press(key)
+        seen.append(browser.run(drawing))
+    assert len(set(seen[:4])) == 4 and seen[4] == seen[0]
+    browser.run("document.getElementById('q4').focus()")
+    browser.press("ArrowRight")
+    assert browser.run("Number(document.getElementById('q4').value)") > 0
+    assert "metres" in browser.run("document.getElementById('q4').getAttribute('aria-valuetext')")
+    assert "Origin of frame 4" in browser.run("document.getElementById('status').textContent")
+    browser.run("document.querySelector('.formulas button').focus()")
+    browser.press("ArrowDown")
+    assert browser.run("document.activeElement.dataset.p") == "FV1"
+    assert "FV1, joint 1: viscous friction" in browser.run("document.getElementById('detail').textContent")
+    browser.press("End")
+    assert browser.run("document.activeElement.dataset.p") == "OFFSET4R"
+    browser.press("Escape")
+    assert browser.run("document.querySelectorAll('.marked').length") == 0
+    assert browser.run("document.querySelectorAll('.formulas button[tabindex=\"0\"]').length") == 1
+
+
+def test_pointer_shows_rows_and_link(browser, files):
+    browser.open(files["tx40"])
+    browser.hover("li[data-p=MX2R] .formula [data-p=M4]")
+    text = browser.run("document.getElementById('detail').textContent")
+    assert "M4, link 4: mass of link 4" in text and "through" in text and "MX2R" in text
+    browser.hover("li[data-p=XX2R] .unit")
+    text = browser.run("document.getElementById('detail').textContent")
+    assert "XX2R, link 2" in text and "enters Γ1, Γ2" in text
+    assert browser.run("[...document.querySelectorAll('li.marked .on')].map(n => n.textContent)") == ["Γ1", "Γ2"]
+    assert browser.run("[...new Set([...document.querySelectorAll('#view .marked')].map(n => n.dataset.link))]") == ["2"]
+    browser.hover(".chip[data-p=XX1]")
+    assert "no effect: link 1 never turns about x1" in browser.run("document.getElementById('detail').textContent")
+    before = browser.run("document.querySelector('#view svg').innerHTML")
+    browser.drag("#view", 60, 20)
+    assert browser.run("document.querySelector('#view svg').innerHTML") != before and browser.complaints == []
+
+
+def test_everything_that_can_be_focused_has_a_name(browser, files):
+    """Names as Chromium's accessibility tree gives them to a screen reader."""
+    browser.open(files["haptic"])
+    nodes = browser.call("Accessibility.getFullAXTree")["nodes"]
+    named = {"button", "slider", "link", "checkbox", "application", "toolbar", "region", "table"}
+    found = [(n["role"]["value"], n.get("name", {}).get("value", "")) for n in nodes if not n["ignored"] and n["role"]["value"] in named]
+    assert {"slider", "application", "button", "checkbox"} <= {role for role, _ in found}
+    assert [f for f in found if not f[1].strip()] == []
+    assert [name for role, name in found if role == "slider"] == ["joint 1, revolute", "joint 2, revolute", "joint 5, revolute"]
+
+
+def test_colours_have_contrast(browser, files):
+    """At least 4.5 to 1 (WCAG 2 AA) for every text on its own background, as computed by the browser."""
+    browser.open(files["scara"])
+    browser.hover("li[data-p=ZZ2R] .unit")
+    weak = browser.run("""(() => {
+      const rgb = (c) => c.match(/[\\d.]+/g).map(Number);
+      const light = (c) => { const [r, g, b] = c.map((v) => v / 255).map((v) => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+      const ground = (n) => { for (; n; n = n.parentElement) { const c = rgb(getComputedStyle(n).backgroundColor); if (c[3] !== 0) return c.slice(0, 3); }
+        return [255, 255, 255]; };
+      return [...document.querySelectorAll('body *')].filter((n) => n.tagName !== 'SCRIPT' && [...n.childNodes].some((t) => t.nodeType === 3 && t.textContent.trim()))
+        .map((n) => { const style = getComputedStyle(n), svg = n.closest('svg'); const a = light(rgb(svg ? style.fill : style.color).slice(0, 3)), b = light(ground(n));
+          return [n.textContent.slice(0, 30), (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)]; }).filter(([, ratio]) => ratio < 4.5);
+    })()""")
+    assert weak == []
