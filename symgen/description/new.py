@@ -40,7 +40,11 @@ elements:
 """
 
 
-def skeleton(name: str) -> str:
-    """Text of a commented two-joint robot file called `name`; raises DescriptionError if that is no identifier."""
+def skeleton(name: str, schema: str | None = None) -> str:
+    """Text of a commented two-joint robot file called `name`; raises DescriptionError if that is no identifier.
+
+    schema : address of the JSON Schema, for the first line, by which editors complete and check the file; None: no such line.
+    """
     check_identifier(name, ("name",))
-    return _SKELETON.format(name=name, schema=SCHEMA)
+    first = "" if schema is None else f"# yaml-language-server: $schema={schema}\n"
+    return first + _SKELETON.format(name=name, schema=SCHEMA)

@@ -7,7 +7,9 @@ Expressions stay text here (`Symbolic`) and are read by `expression.parse` when 
 from __future__ import annotations
 
 import difflib
+import json
 import math
+import pathlib
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
@@ -133,7 +135,17 @@ class RobotFile(_Table):
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema of a robot file, for editors."""
-    return RobotFile.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **RobotFile.model_json_schema()}
+
+
+def schema_text() -> str:
+    """The text of robot.schema.json, which is installed beside this module."""
+    return json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
+
+
+def schema_file() -> pathlib.Path:
+    """The installed robot.schema.json."""
+    return pathlib.Path(__file__).with_name("robot.schema.json")
 
 
 _EXPECTED = {

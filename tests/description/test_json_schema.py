@@ -1,0 +1,64 @@
+"""The published JSON Schema: current, true of every robot file this package ships, and as strict as the reader on keys."""
+
+import json
+import re
+from importlib import resources
+from pathlib import Path
+
+import jsonschema
+import pytest
+from ruamel.yaml import YAML
+from typer.testing import CliRunner
+
+from symgen.cli.main import app
+from symgen.description import json_schema, packaged_robots, skeleton
+from symgen.description.schema import schema_file, schema_text
+
+
+def plain(text):
+    """Data as an editor sees it: keys are text."""
+    return json.loads(json.dumps(YAML(typ="safe", pure=True).load(text)))
+
+
+def faults(data):
+    validator = jsonschema.Draft202012Validator(json_schema())
+    return [error.message for error in validator.iter_errors(data)]
+
+
+def test_checked_in_file_is_current():
+    """After a change: symgen schema > symgen/description/robot.schema.json."""
+    assert json.loads(schema_file().read_text(encoding="utf-8")) == json.loads(schema_text()) == json_schema()
+    jsonschema.Draft202012Validator.check_schema(json_schema())
+
+
+def test_schema_verb_prints_it():
+    assert json.loads(CliRunner().invoke(app, ["schema"]).stdout) == json_schema()
+
+
+@pytest.mark.parametrize("name", packaged_robots())
+def test_packaged_robots_follow_it(name):
+    assert faults(plain((resources.files("symgen.description") / "robots" / f"{name}.yaml").read_text(encoding="utf-8"))) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("title:", "titel:", "titel"),
+        ("kind: coulomb", "kind: dry", "'dry' is not one of"),
+        ("[0, -g, 0]", "[0, -g]", "too short"),
+        ("ant: 1", "ant: one", "'one' is not of type 'integer'"),
+        ("symgen: 1 ", "convention: classic\nsymgen: 1 ", "'classic' is not one of"),
+    ],
+)
+def test_editors_see_faults(old, new, words):
+    text = skeleton("arm")
+    assert old in text and faults(plain(text)) == []
+    assert words in " ".join(faults(plain(text.replace(old, new, 1))))
+
+
+def test_first_line_of_a_new_file_leads_to_it(tmp_path):
+    file = tmp_path / "a folder" / "my_arm.yaml"
+    assert CliRunner().invoke(app, ["new", str(file)]).exit_code == 0
+    first = file.read_text(encoding="utf-8").splitlines()[0]
+    address = re.fullmatch(r"# yaml-language-server: \$schema=(\S+)", first).group(1)
+    assert (file.parent / Path(address.replace("%20", " "))).resolve() == schema_file().resolve()
