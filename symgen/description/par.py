@@ -36,7 +36,6 @@ BASE_MOTION = ("W0", "WP0", "V0", "VP0")
 NAMES_ONLY = ("QP", "QDP", "GAM")  # names of rates, accelerations and torques: nothing of the mechanism
 KNOWN = {key.lower(): key for key in (*GEOMETRIC, *COUNTS, *FAMILIES, *WRENCH, *BASE_MOTION, *NAMES_ONLY, "G", "Z", "eta", "k")}
 
-_COMMENT = re.compile(r"\(\*(.*?)\*\)", re.DOTALL)
 _ENTRY = re.compile(r"\s*([A-Za-z_]\w{0,39})\s*=\s*(\{[^{}=]*\}|[^\s{};=]+)\s*;?", re.ASCII)
 _IDENTITY = "1000010000100001"
 
@@ -90,9 +89,7 @@ def _text(content: bytes) -> str:
 
 def _scan(text: str, par: _Par) -> None:
     """Comments and entries of `text` into `par`."""
-    for comment in _COMMENT.finditer(text):
-        _comment(comment.group(1).strip(), text.count("\n", 0, comment.start()) + 1, par)
-    text = _COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment.group()), text)
+    text = _without_comments(text, par)
     position, end = 0, len(text.rstrip())
     while position < end:
         entry = _ENTRY.match(text, position)
@@ -113,6 +110,19 @@ def _scan(text: str, par: _Par) -> None:
             line += item.count("\n")
         par.lists[key] = items
         position = entry.end()
+
+
+def _without_comments(text: str, par: _Par) -> str:
+    """`text` with blanks for its comments, which go into `par`; one pass, however many a file opens."""
+    parts, position = [], 0
+    while (start := text.find("(*", position)) >= 0:
+        end, line = text.find("*)", start + 2) + 2, text.count("\n", 0, start) + 1
+        if end < 2:
+            raise DescriptionError("a comment (* opens and does not end; add *)", line=line)
+        _comment(text[start + 2 : end - 2].strip(), line, par)
+        parts += [text[position:start], re.sub(r"[^\n]", " ", text[start:end])]
+        position = end
+    return "".join([*parts, text[position:]])
 
 
 def _comment(text: str, line: int, par: _Par) -> None:
@@ -285,7 +295,7 @@ def _parameters(par: _Par, NL: int, fixed: set[int]) -> tuple[dict[str, float], 
                 if str(e).lower() != name.lower():
                     renamed.append(f"{name} (written {e})")
             else:
-                values[name] = float(e)
+                values[name] = _value(e, name, item[1])
     if renamed:
         par.notes.append(f"parameters of this format's names: {', '.join(renamed[:20])}")
     massless = set.intersection(*(zero[p] for p in INERTIAL))
@@ -298,6 +308,13 @@ def _parameters(par: _Par, NL: int, fixed: set[int]) -> tuple[dict[str, float], 
     present |= {parameter(p, j) for p, joints in keys.items() for j in joints}
     values |= par.numbers.get("values", {})
     return {name: value for name, value in values.items() if name in present}, massless, keys
+
+
+def _value(e: Expression, name: str, line: int) -> float:
+    try:
+        return float(e)
+    except (ValueError, OverflowError, ZeroDivisionError) as error:
+        raise DescriptionError(f"{name}: {e} has no finite real value; expected a number or a symbol", line=line) from error
 
 
 def _note_rest(par: _Par) -> None:
