@@ -105,15 +105,13 @@ def _bracketed(inner: MathML) -> MathML:
     return element("mrow", element("mo", "("), inner, element("mo", ")"))
 
 
-def _subscripted(text: str, power: int = 1, **attributes: str) -> MathML:
+def _subscripted(text: str, **attributes: str) -> MathML:
     letter, subscript = symbol(text)
-    parts = [element("mi", GREEK.get(letter, letter), **({} if subscript or power != 1 else attributes))]
-    if subscript:
-        parts.append(row([element("mn" if p.isdigit() else "mi", p) for p in re.findall(r"\d+|\D+", subscript)]))
-    if power != 1:
-        parts.append(element("mn", str(power)))
-    tag = ("m" + "sub" * bool(subscript) + "sup" * (power != 1)) if len(parts) > 1 else ""
-    return element(tag, *parts, **attributes) if tag else parts[0]
+    base = GREEK.get(letter, letter)
+    if not subscript:
+        return element("mi", base, **attributes)
+    pieces = [element("mn" if p.isdigit() else "mi", p) for p in re.findall(r"\d+|\D+", subscript)]
+    return element("msub", element("mi", base), row(pieces), **attributes)
 
 
 def _term(m: tuple[tuple[str | Call, int], ...], c: Fraction) -> MathML:
@@ -138,8 +136,8 @@ def _product(factors: list[MathML]) -> list[MathML]:
 
 def _power(a: str | Call, n: int) -> MathML:
     if isinstance(a, str):
-        return _subscripted(a, n)
-    if a.function == "sqrt":
+        base = name(a)
+    elif a.function == "sqrt":
         base = element("msqrt", expression(a.argument))
     elif a.function == "inv":
         base = _bracketed(expression(a.argument))

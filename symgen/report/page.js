@@ -89,12 +89,18 @@
     if (!event.ctrlKey && !event.altKey && !event.metaKey && key(event.key)) event.preventDefault();
   });
   for (const button of document.querySelectorAll("[data-key]")) button.addEventListener("click", () => key(button.dataset.key));
-  by("view").addEventListener("pointerdown", (event) => by("view").setPointerCapture(event.pointerId));
+  let grip = null; // where the pointer was; touch turns sideways only, so that a page can still be scrolled with a finger on the drawing
+  by("view").addEventListener("pointerdown", (event) => {
+    grip = [event.clientX, event.clientY];
+    by("view").setPointerCapture(event.pointerId);
+  });
   by("view").addEventListener("pointermove", (event) => {
-    if (!by("view").hasPointerCapture(event.pointerId)) return;
-    drawing.turn(-event.movementX * 0.01, event.pointerType === "touch" ? 0 : event.movementY * 0.01);
+    if (!grip) return;
+    drawing.turn(-(event.clientX - grip[0]) * 0.01, event.pointerType === "touch" ? 0 : (event.clientY - grip[1]) * 0.01);
+    grip = [event.clientX, event.clientY];
     redraw();
   });
+  for (const end of ["pointerup", "pointercancel"]) by("view").addEventListener(end, () => { grip = null; });
   for (const [id, option] of [["show-y", "y"], ["show-names", "names"]])
     by(id).addEventListener("change", (event) => {
       drawing.options[option] = event.target.checked;

@@ -116,6 +116,25 @@ def test_pointer_shows_rows_and_link(browser, files):
     assert browser.run("document.querySelector('#view svg').innerHTML") != before and browser.complaints == []
 
 
+def test_a_finger_turns_the_drawing_and_opens_a_parameter(browser, files):
+    browser.open(files["tx40"], 390)
+    browser.call("Emulation.setTouchEmulationEnabled", enabled=True)
+    before = browser.run("document.querySelector('#view svg').innerHTML")
+    x, y = browser.centre("#view")
+    browser.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+    for step in range(1, 6):
+        browser.call("Input.dispatchTouchEvent", type="touchMove", touchPoints=[{"x": x + 12 * step, "y": y}])
+    browser.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+    assert browser.run("document.querySelector('#view svg').innerHTML") != before
+    x, y = browser.centre(".chip[data-p=YY2]")
+    browser.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+    browser.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+    assert "YY2, link 2" in browser.run("document.getElementById('detail').textContent")
+    inside = "(() => { const b = document.getElementById('detail').getBoundingClientRect(); return b.top > 0 && b.bottom <= innerHeight + 1; })()"
+    assert browser.run(inside)
+    browser.call("Emulation.setTouchEmulationEnabled", enabled=False)
+
+
 def test_everything_that_can_be_focused_has_a_name(browser, files):
     """Names as Chromium's accessibility tree gives them to a screen reader."""
     browser.open(files["haptic"])
