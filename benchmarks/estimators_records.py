@@ -1,0 +1,159 @@
+"""Every estimator on the measured records: tables of docs/estimators.md.
+
+    python benchmarks/estimators_records.py [-o docs/estimators.md]
+
+EMPS: identified on one record, torque predicted on the other, and the position simulated with the parameters found, with and without the tick of delay
+of the diagram. TX40: first half of the window predicts the second. All methods of a table use the same rows. Records: `symgen datasets`.
+"""
+
+# ruff: noqa: E402
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"  # before numpy
+
+import numpy as np
+from scipy.io import loadmat
+
+from runtime import load_model, read_records, study_from_mapping
+from runtime.closed_loop import closed_loop
+from runtime.errors import InputError
+from runtime.estimate import Estimate, aligned
+from runtime.estimators import estimate
+from runtime.io.datasets import dataset_study, fetch
+from runtime.observation import Observation
+from runtime.perturbation import with_errors
+from runtime.reference import Reference
+from runtime.studies.simulation import Simulator
+from runtime.study import EstimateSettings
+
+GENERATED = Path(__file__).resolve().parents[1] / "generated"
+ENCODER = {"emps": 1e-6, "tx40": 1e-5}  # deviation of a position that TLS is told, m and rad of the joint
+TEXT = Path(__file__).with_name("estimators_records.md")
+
+
+def predicted(seen: Observation, X: np.ndarray) -> float:
+    """100 ||Y - W X||/||Y||."""
+    return 100 * float(np.linalg.norm(seen.Y - seen.W @ X) / np.linalg.norm(seen.Y))
+
+
+def emps() -> str:
+    """Parameters by every method on each record, error on both, error of the simulated position without and with delay."""
+    model, study = load_model("emps", folder=GENERATED), study_from_mapping(dataset_study("emps"))
+    records = read_records(study.record + study.validate.record, model)
+    gain = float(study.controller.law.gain) if not isinstance(study.controller.law.gain, tuple) else study.controller.law.gain[0]
+    pulses = gain * loadmat(fetch("emps", "DATA_EMPS_PULSES.mat"))["pulses_N"].astype(float)
+    simulators = [Simulator(model, replace(study.controller, delay=delay)) for delay in (0, 1)]
+    references = [Reference.sampled(record.q_r, 1000.0) for record in records if record.q_r is not None]
+    head = (
+        "identified on",
+        "method",
+        *model.BASE_PARAMETERS,
+        *(f"%sigma {n}" for n in model.BASE_PARAMETERS),
+        "own %",
+        "other %",
+        "q %, delay 0",
+        "delay 1",
+    )
+    lines: list[Sequence[str]] = [head]
+    for k, record in enumerate(records):
+        other = closed_loop(model, [records[1 - k]], study, simulators[0]).measured()
+        for label, delay, settings in EMPS_METHODS:
+            if k == 1 and settings.method in ("iv", "didim", "cloe"):
+                continue  # the pulses enter behind the controller: this loop is not simulated from its reference alone
+            seen = closed_loop(model, [record], study, simulators[delay]).measured()
+            if settings.method == "tls":
+                seen = with_errors(model, record, study, seen, ENCODER["emps"])
+            found = estimate(seen, settings, model=model)
+            errors = []
+            for simulator in simulators:
+                run = simulator.run(found.X, references[k], start=record.q[0], ideal=True, disturbance=pulses if k else None)
+                errors.append(100 * float(np.linalg.norm((run.q - record.q)[49:]) / np.linalg.norm(record.q[49:])))
+            cells = [*(f"{x:.3f}" for x in found.X), *(f"{s:.2f}" for s in found.relative_sigma)]
+            lines.append(
+                (
+                    record.name,
+                    label,
+                    *cells,
+                    f"{predicted(seen, found.X):.3f}",
+                    f"{predicted(other, found.X):.3f}",
+                    *(f"{e:.5f}" for e in errors),
+                )
+            )
+    return aligned(lines)
+
+
+EMPS_METHODS: tuple[tuple[str, int, EstimateSettings], ...] = (
+    ("ols", 0, EstimateSettings()),
+    ("wls", 0, EstimateSettings("wls")),
+    ("irls", 0, EstimateSettings("irls")),
+    ("tls", 0, EstimateSettings("tls", options={"position_error": ENCODER["emps"], "bootstrap": 0})),
+    ("iv", 0, EstimateSettings("iv")),
+    ("iv, delay", 1, EstimateSettings("iv")),
+    ("didim", 0, EstimateSettings("didim")),
+    ("didim, delay", 1, EstimateSettings("didim")),
+    ("cloe", 0, EstimateSettings("cloe")),
+    ("cloe, delay", 1, EstimateSettings("cloe")),
+    ("clie", 0, EstimateSettings("cloe", options={"output": "torque"})),
+)
+
+
+def tx40(methods: Sequence[str]) -> tuple[str, str]:
+    """Errors by joint and held out, and the parameters with their sigma, on the window of the chapter, without the median filter."""
+    from simulation import LAW
+
+    model, mapping = load_model("tx40", folder=GENERATED), dict(dataset_study("tx40"))
+    mapping["signals"] = {**mapping["signals"], "median": 1}  # TLS knows errors behind linear filters alone
+    mapping["controller"] = {"law": LAW, "rate": 5000}
+    study = study_from_mapping(mapping)
+    record = read_records(study.record, model)[0]
+    until = int(np.searchsorted(record.t, 7.6))
+    record = replace(record, t=record.t[:until], q=record.q[:until], tau=record.tau[:until])
+    simulator = Simulator(model, replace(study.controller, torque=replace(study.controller.torque, saturation=None)))
+    seen = closed_loop(model, [record], study, simulator, reference="measured").measured()
+    seen = with_errors(model, record, study, seen, ENCODER["tx40"])
+    first, second = (seen.between(*window) for window in study.validate.split)
+    options: Mapping[str, Mapping[str, Any]] = {
+        "tls": {"position_error": ENCODER["tx40"], "bootstrap": 0},
+        "iv": {"start": "values", "gains": "values", "reference": "measured"},
+        "feasible": {"bootstrap": 0},
+    }
+    found: dict[str, Estimate] = {}
+    lines: list[Sequence[str]] = [("method", "status", *(f"joint {j} %" for j in model.JOINTS), "total %", "held out %")]
+    for method in methods:
+        settings = EstimateSettings(method, options=options.get(method, {}))  # type: ignore[arg-type]
+        try:
+            found[method] = e = estimate(seen, settings, model=model)
+            held = predicted(second, estimate(first, settings, model=model).X)
+        except InputError as error:
+            lines.append((method, str(error)))
+            continue
+        lines.append(
+            (method, e.status, *(f"{joint.relative_error:.2f}" for joint in e.per_joint), f"{e.relative_error:.3f}", f"{held:.2f}")
+        )
+    values: list[Sequence[str]] = [("parameter", *(cell for m in found for cell in (m, "sigma")))]
+    for i, name in enumerate(seen.names):
+        values.append((name, *(cell for e in found.values() for cell in (f"{e.X[i]:.4g}", f"{e.sigma[i]:.2g}"))))
+    return aligned(lines), aligned(values)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/estimators.md"))
+    parser.add_argument("--methods", nargs="+", default=["ols", "wls", "irls", "tls", "iv", "feasible"])
+    given = parser.parse_args()
+    errors, parameters = tx40(given.methods)
+    page = TEXT.read_text().format(emps=emps(), errors=errors, parameters=parameters, **{f"{r}_encoder": x for r, x in ENCODER.items()})
+    print(page)
+    given.output.write_text(page)
+
+
+if __name__ == "__main__":
+    main()
