@@ -19,7 +19,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from symgen.derive.loops import close
 from symgen.description.expression import ONE, Expression
 from symgen.description.robot import Element, Robot
-from symgen.emit.header import COLUMNS, informative_columns
+from symgen.emit.header import informative_columns
 from symgen.emit.spec import ModuleSpec, module_spec, unit
 from symgen.regroup.certificate import Certificate, certify
 from symgen.regroup.regrouping import Regrouping
@@ -58,7 +58,7 @@ def robot_page(regrouping: Regrouping) -> str:
         policy=f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'; base-uri 'none'; form-action 'none'",
         data=embedded(drawing | {"parameters": _pointed_at(spec, found)}),
         verdict=_verdict(regrouping, certificate),
-        joints=[j | {"unit": "m" if j["slides"] else "°", "name": mathml.math(mathml.name(f"q{j['j']}"))} for j in drawing["joints"]],
+        joints=[j | {"name": mathml.math(mathml.name(f"q{j['j']}"))} for j in drawing["joints"]],
         passive=[(mathml.math(mathml.name(f"q{j}")), j, text) for j, text in passive_text(robot).items()],
         frames=_frame_rows(robot),
         constants=[(mathml.math(mathml.name(name)), f"{value:.10g}") for name, value in robot.constants.items()],
@@ -70,7 +70,6 @@ def robot_page(regrouping: Regrouping) -> str:
         without=_without_effect(found),
         costs=[(name.replace("_", " "), getattr(spec, name)) for name in MODELS if getattr(spec, name) is not None],
         certificate=certificate,
-        regrouping=regrouping,
         version=VERSION,
     )
 
@@ -102,7 +101,7 @@ def _frame_rows(robot: Robot) -> dict[str, Any]:
     for f in robot.frames:
         cells = [mathml.math(mathml.expression(x)) if isinstance(x := getattr(f, c), Expression) else str(x) for c in kept[1:]]
         rows.append({"j": f.j, "cells": cells, "kind": KINDS_OF_JOINT[f.sigma]})
-    return {"header": [HEADINGS.get(c, c) for c in kept], "rows": rows, "columns": COLUMNS}
+    return {"header": [HEADINGS.get(c, c) for c in kept], "rows": rows}
 
 
 def _relations(robot: Robot) -> list[tuple[MathML, str]]:
