@@ -31,7 +31,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 
 def cestac(
-    robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml) or generated module (.py).")],
+    robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py).")],
     record: Annotated[str, typer.Argument(help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side).")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for cestac.json, report.html, the figure and study.yaml.")

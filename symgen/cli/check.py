@@ -17,7 +17,7 @@ TOLERANCE = 1e-9  # relative to the largest entry: rounding of some thousand ope
 
 
 def check(
-    robot: Annotated[str, typer.Argument(help="Packaged robot or robot file (.yaml).")],
+    robot: Annotated[str, typer.Argument(help="Packaged robot or robot file (.yaml, .par, .urdf).")],
     json: Annotated[bool, typer.Option("--json", help="Print the certificate as JSON.")] = False,
 ) -> None:
     """Verify the base parameters of ROBOT: exact rank, identities at fresh geometry, numeric rank and torques by CasADi energies."""

@@ -33,7 +33,7 @@ class Known:
 
 
 def excite(
-    robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml) or generated module (.py).")],
+    robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py).")],
     record: Annotated[
         str | None,
         typer.Argument(

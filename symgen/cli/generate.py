@@ -17,7 +17,8 @@ TARGETS = {"numpy": "{}.py", "casadi": "{}_casadi.py", "c": "{}.c", "xp": "{}_xp
 
 def generate(
     robots: Annotated[
-        list[str], typer.Argument(metavar="ROBOT...", help="Packaged robots or robot files (.yaml); `all` for every packaged one.")
+        list[str],
+        typer.Argument(metavar="ROBOT...", help="Packaged robots or robot files (.yaml, .par, .urdf); `all` for every packaged one."),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the modules.")] = Path("generated"),
     target: Annotated[

@@ -60,7 +60,7 @@ def fail(message: str) -> NoReturn:
 
 @contextmanager
 def opened_model(robot: str) -> Iterator[GeneratedModel]:
-    """The model of a packaged robot, a robot file (.yaml) or a generated module (.py).
+    """The model of a packaged robot, a robot file (.yaml, .par, .urdf) or a generated module (.py).
 
     A robot is emitted into a folder that lives as long as the block, since other processes load the model from its file.
     """

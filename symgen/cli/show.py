@@ -18,7 +18,7 @@ FORMATS = ("text", "latex", "json")
 
 
 def show(
-    robot: Annotated[str, typer.Argument(help="Packaged robot or robot file (.yaml).")],
+    robot: Annotated[str, typer.Argument(help="Packaged robot or robot file (.yaml, .par, .urdf).")],
     format: Annotated[str, typer.Option(help="text, latex or json.")] = "text",
     only: Annotated[str | None, typer.Option(help="One base parameter, e.g. XX2R.")] = None,
     recursive: Annotated[bool, typer.Option("--recursive", help="Link by link, as SYMORO prints, instead of flat as eq. (27).")] = False,

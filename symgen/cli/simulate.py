@@ -21,7 +21,7 @@ RECORD = "simulated.csv"
 
 
 def simulate(
-    robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml) or generated module (.py).")],
+    robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py).")],
     study: Annotated[str, typer.Argument(help="Study file with a section `controller`, or a dataset that has one.")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help=f"Folder for {RECORD}, study.yaml, simulation.json and the figure.")

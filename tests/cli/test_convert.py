@@ -108,3 +108,13 @@ def test_values_of_an_estimate_go_into_the_urdf(tmp_path):
 def test_what_a_urdf_cannot_hold_is_refused(robot, words, tmp_path):
     result = run("convert", robot, tmp_path / "robot.urdf")
     assert result.exit_code == 2 and words in result.stderr and list(tmp_path.iterdir()) == []
+
+
+def test_verbs_take_a_urdf_as_it_is(tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_text(ARM.replace("1.5708", "0"))
+    result = run("check", file)
+    assert result.exit_code == 0 and "certificate valid" in result.stdout
+    assert run("generate", file, "-o", tmp_path / "models").exit_code == 0
+    text = (tmp_path / "models" / "arm.py").read_text()
+    assert "ZZ1R = ZZ1 + Ia1 + D2**2*M2" in text and "generate arm.urdf" in text
