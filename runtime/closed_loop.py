@@ -10,7 +10,7 @@ g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies
 of the simulated loop stays that of the real one while X^k is far from the truth. Rows are chosen by the velocity of the reference, never by that
 of the measured positions: a choice that depends on noise biases every method. Slow rows of joint j (`rows.low_speed`) are those where a dry friction
 that acts on it, coupled ones of a wrist included, slips slower: at rest its torque is anything between -FS and FS, not W X, and the decimation smears
-that into the rows `around` (a noise-free record of the TX40 with stops: Ia5 9 % off; rows within 0.1 s left out: 0.2 %). Instants with the torque at
+that into the rows `around` (a noise-free record of the TX40 with stops: Ia5 9 % off; rows within 0.1 s left out: 0.1 %). Instants with the torque at
 its limit are left out.
 
 Where the reference is not known (`reference: measured`), the measured motion through the filters stands for it: then the instruments carry the
