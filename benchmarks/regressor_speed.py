@@ -43,8 +43,8 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_state
+from symgen.description import load_robot
 from symgen.description.robot import Robot
-from symgen.description.yaml import load_robot
 from symgen.emit import generate_module
 
 SAMPLES = 7103  # not a multiple of 8

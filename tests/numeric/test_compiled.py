@@ -174,6 +174,25 @@ def test_large_results_are_streamed(model: GeneratedModel, warm: Path, monkeypat
 
 
 @needs_compiler
+@pytest.mark.parametrize("shift", range(8))
+def test_streamed_rows_at_every_place_in_a_cache_line(model: GeneratedModel, warm: Path, shift: int) -> None:
+    """Written past the caches in whole lines: the bits of ordinary stores, nothing beside the rows, whatever their length."""
+    c = in_c(model, warm)
+    constants, (b, n) = np.array([*model.CONSTANTS.values(), 0.0]), model.STRUCTURE.shape
+    for N in (*range(1, 68), 203):
+        given, results = states(N), []
+        for flags in (0, 1):
+            memory = np.full(b * n * N + 32, np.nan)
+            start = (-memory.ctypes.data // 8) % 8 + 8 + shift
+            rows = memory[start : start + b * n * N]
+            pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*given, constants, rows)]
+            assert c._library.planar_2r_regressor(ctypes.c_int64(N), *pointers, ctypes.c_int32(flags)) == 0
+            assert np.isnan(memory[:start]).all() and np.isnan(memory[start + b * n * N :]).all()
+            results.append(rows)
+        assert np.array_equal(*results, equal_nan=True) and np.isfinite(results[0]).any(), N
+
+
+@needs_compiler
 def test_the_cache_is_used_and_repaired(model: GeneratedModel, tmp_path: Path) -> None:
     in_c(model, tmp_path)
     (made,) = tmp_path.iterdir()  # no temporary file is left
