@@ -27,6 +27,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 from simulation import LAW
 
 from runtime import InputError, load_model, read_records, study_from_mapping
@@ -150,13 +151,13 @@ def _rows(b: Bench, record: Record, seen: Observation, method: str, key: Key) ->
     return with_errors(b.model, record, b.study, seen, key.step / np.sqrt(12)) if method == "tls" and key.step else seen
 
 
-def wanted(records: int, cloe: int) -> Iterator[Key]:
+def wanted(records: int, cloe: Mapping[str, int]) -> Iterator[Key]:
     """Every record, seed by seed, so that a run cut short has all steps."""
     for seed in range(records):
         for robot in ("emps", "tx40"):
             for step in STEPS[robot]:
                 yield Key(robot, step, seed, METHODS)
-                if robot == "emps" and seed < cloe:
+                if seed < cloe[robot]:
                     yield Key(robot, step, seed, ("cloe",))
                 if seed < 3:
                     yield Key(robot, step, seed, ("ols", "iv", "didim"), recorded=True)
@@ -286,6 +287,7 @@ def bias_figure(rows: Sequence[Mapping[str, Any]], kept: Mapping[str, Sequence[i
                 )
         right.axhline(5, color="k", lw=0.5, ls=":")
         right.set(xlabel=f"step, {UNIT[robot]}", ylabel="largest bias, %")
+        _at_steps(right, robot)
         right.legend(fontsize=7)
     return figure
 
@@ -315,9 +317,16 @@ def error_figure(rows: Sequence[Mapping[str, Any]], kept: Mapping[str, Sequence[
             ylabel="%e, rms over parameters and records",
             title=f"{robot}, encoder inside the loop",
         )
+        _at_steps(axes, robot)
         axes.grid(True, which="major", lw=0.4, alpha=0.6)
         axes.legend(fontsize=6.5)
     return figure
+
+
+def _at_steps(axes: Any, robot: str) -> None:
+    """Ticks at the steps that were tried."""
+    axes.set_xticks(STEPS[robot], [f"{step:.3g}" for step in STEPS[robot]])
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 PAGE = """# Estimators on simulated records
@@ -334,6 +343,13 @@ scatter / sqrt(records) is not distinguished from zero. `scatter/sigma`: median 
 
 {tables}
 
+Read: where OLS is biased by more than 5 %, DIDIM is five times less biased, but for one parameter at the coarsest step; IV is so for most parameters,
+not for all: friction of joint 2 and ZZ3R keep more. Likely because a loop that answers encoder steps no longer moves like the one without them, and
+sign(qd) of such a motion, filtered, is in W. WLS and TLS do not help on the TX40: both suppose errors that are independent of the torque, and inside
+the loop the torque answers them. Output error in position is the first to break (EMPS, coarsest step). Stated sigma is above the scatter where the
+encoder is coarse: its residuals repeat from record to record. Dashed: steps put into the recorded positions alone, by the random rounding of CESTAC.
+DIDIM does not see them at all, which says nothing about the encoder in the loop; OLS sees more of them than of steps in the loop, but for the coarsest.
+
 ![bias and scatter](estimators.png)
 
 ![%e against Delta](cestac_estimators.png)
@@ -344,11 +360,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--records", type=int, default=100)
     parser.add_argument("--cloe", type=int, default=10, help="records of the EMPS on which output error is tried")
+    parser.add_argument("--cloe-tx40", type=int, default=0, help="the same of the TX40: minutes and 1 GB each")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     parser.add_argument("--runs", type=Path, default=Path("estimators_runs.jsonl"), help="file of the estimates")
     given = parser.parse_args()
-    rows = computed(given.runs, list(wanted(given.records, given.cloe)), given.workers)
+    rows = computed(given.runs, list(wanted(given.records, {"emps": given.cloe, "tx40": given.cloe_tx40})), given.workers)
     kept = {robot: determined(robot) for robot in ("emps", "tx40")}
     tables = "\n\n".join(f"{robot}\n\n```\n{table(rows, robot, kept[robot])}\n```" for robot in kept)
     counts = "; ".join(f"{robot} {', '.join(bench(robot).model.BASE_PARAMETERS[i] for i in numbers)}" for robot, numbers in kept.items())
