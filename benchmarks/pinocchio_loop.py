@@ -67,6 +67,7 @@ def build(folder: Path) -> dict[str, Path]:
     compiler = os.environ.get("CXX") or shutil.which("c++") or "g++"
     common = [compiler, "-std=c++17", "-O3", "-DNDEBUG", *(f"-D{d}" for d in DEFINITIONS), f"-I{include}", f"-I{include / 'eigen3'}"]
     library = ["-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION", f"-L{lib}", f"-Wl,-rpath,{lib}", "-lpinocchio_default"]
+    folder.mkdir(parents=True, exist_ok=True)
     options = {"C++ headers": ["-march=native"], "C++ library": library}
     for name, own in options.items():
         if not (folder / name).is_file():
