@@ -343,8 +343,8 @@ scatter / sqrt(records) is not distinguished from zero. `scatter/sigma`: median 
 
 {tables}
 
-Read: where OLS is biased by more than 5 %, DIDIM is five times less biased, but for one parameter at the coarsest step; IV is so for most parameters,
-not for all: friction of joint 2 and ZZ3R keep more. Likely because a loop that answers encoder steps no longer moves like the one without them, and
+Read: where OLS is biased by more than 5 %, DIDIM is about five times less biased or better, IV so for most parameters and not for all: friction of
+joint 2 and ZZ3R keep more (last columns). Likely because a loop that answers encoder steps no longer moves like the one without them, and
 sign(qd) of such a motion, filtered, is in W. WLS and TLS do not help on the TX40: both suppose errors that are independent of the torque, and inside
 the loop the torque answers them. Output error in position is the first to break (EMPS, coarsest step). Stated sigma is above the scatter where the
 encoder is coarse: its residuals repeat from record to record. Dashed: steps put into the recorded positions alone, by the random rounding of CESTAC.
