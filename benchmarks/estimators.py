@@ -348,7 +348,7 @@ joint 2 and ZZ3R keep more (last columns). Likely because a loop that answers en
 sign(qd) of such a motion, filtered, is in W. WLS and TLS do not help on the TX40: both suppose errors that are independent of the torque, and inside
 the loop the torque answers them. Output error in position is the first to break (EMPS, coarsest step). Stated sigma is above the scatter where the
 encoder is coarse: its residuals repeat from record to record. Dashed: steps put into the recorded positions alone, by the random rounding of CESTAC.
-DIDIM does not see them at all, which says nothing about the encoder in the loop; OLS sees more of them than of steps in the loop, but for the coarsest.
+DIDIM does not see them at all, which says nothing about the encoder in the loop; OLS sees more of them than of steps in the loop, but for the coarsest of the TX40.
 
 ![bias and scatter](estimators.png)
 
