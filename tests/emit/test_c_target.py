@@ -123,7 +123,9 @@ def test_long_chain(tmp_path: Path) -> None:
     )
     emitted_files = generate_files(robot, targets=("numpy", "c"))
     assert "inertia_matrix_part3(" in emitted_files["chain.c"]
-    library = ctypes.CDLL(str(compiled(tmp_path, emitted_files["chain.c"], COMPILERS[0], ["-O0", "-shared", "-fPIC", "-ffp-contract=off", "-DPORTABLE"])))
+    library = ctypes.CDLL(
+        str(compiled(tmp_path, emitted_files["chain.c"], COMPILERS[0], ["-O0", "-shared", "-fPIC", "-ffp-contract=off", "-DPORTABLE"]))
+    )
     compare(library, numpy_module("chain", emitted_files["chain.py"]), (1, 33))
 
 

@@ -193,5 +193,5 @@ def test_arithmetic_refuses(text):
 def test_blocks_of_the_records():
     assert [study_from_mapping({"stream": value}).stream for value in ("auto", "off", 5000)] == ["auto", "off", 5000]
     for value in (9, "always", 0.5):
-        with pytest.raises(SettingsError, match="stream: .*expected auto"):
+        with pytest.raises(SettingsError, match=r"stream: .*expected auto"):
             study_from_mapping({"stream": value})
