@@ -7,7 +7,6 @@ It is parsed before it runs (`runtime.model_source`) and imports array_api_compa
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
@@ -16,7 +15,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from runtime.errors import ModelError
-from runtime.model import FOLDER, GeneratedModel
+from runtime.model import GeneratedModel, sibling_file
 from runtime.model_source import module_of
 
 CONSTANTS = ("NAME", "JOINTS", "BASE_PARAMETERS", "STRUCTURE", "CONSTANTS", "SIGNALS", "ENTRIES", "SOURCE_SHA256")
@@ -49,13 +48,7 @@ def load_arrays(model: str | Path | ModuleType, *, of: GeneratedModel | None = N
     """
     if isinstance(model, ModuleType):
         return _checked(model, of)
-    path = Path(model)
-    if isinstance(model, str) and re.fullmatch(r"\w+", model):
-        path = (folder or FOLDER) / f"{model.removesuffix('_xp')}_xp.py"
-    if not path.is_file():
-        robot = path.stem.removesuffix("_xp")
-        raise ModelError(f"no array model {path}; emit it with `symgen generate {robot} --target numpy,xp -o {path.parent}`")
-    return _checked(module_of(path), of)
+    return _checked(module_of(sibling_file(model, "xp", title="array", folder=folder)), of)
 
 
 def _checked(module: ModuleType, of: GeneratedModel | None) -> ArrayModel:

@@ -88,6 +88,17 @@ def checked_model(module: ModuleType) -> GeneratedModel:
     return model
 
 
+def sibling_file(model: str | Path, target: str, *, title: str, folder: Path | None = None) -> Path:
+    """The module of another target: of a name, FOLDER/NAME_target.py, or of a path; ModelError, which says how to emit it, where there is none."""
+    path, ending = Path(model), f"_{target}"
+    if isinstance(model, str) and re.fullmatch(r"\w+", model):
+        path = (folder or FOLDER) / f"{model.removesuffix(ending)}{ending}.py"
+    if not path.is_file():
+        robot = path.stem.removesuffix(ending)
+        raise ModelError(f"no {title} model {path}; emit it with `symgen generate {robot} --target numpy,{target} -o {path.parent}`")
+    return path
+
+
 def require(model: GeneratedModel, *functions: str) -> None:
     """Raise ModelError unless the model offers all the named functions."""
     missing = [name for name in functions if not callable(getattr(model, name, None))]

@@ -7,14 +7,13 @@ It is parsed before it runs (`runtime.model_source`) and imports casadi itself; 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol, cast
 
 from runtime.errors import ModelError
-from runtime.model import FOLDER, GeneratedModel
+from runtime.model import GeneratedModel, sibling_file
 from runtime.model_source import module_of
 
 CONSTANTS = ("NAME", "JOINTS", "BASE_PARAMETERS", "CONSTANTS", "LIMITS", "VALUES", "SOURCE_SHA256")
@@ -53,13 +52,7 @@ def load_symbolic(model: str | Path | ModuleType, *, of: GeneratedModel | None =
     """
     if isinstance(model, ModuleType):
         return _checked(model, of)
-    path = Path(model)
-    if isinstance(model, str) and re.fullmatch(r"\w+", model):
-        path = (folder or FOLDER) / f"{model.removesuffix('_casadi')}_casadi.py"
-    if not path.is_file():
-        robot = path.stem.removesuffix("_casadi")
-        raise ModelError(f"no CasADi model {path}; emit it with `symgen generate {robot} --target numpy,casadi -o {path.parent}`")
-    return _checked(module_of(path), of)
+    return _checked(module_of(sibling_file(model, "casadi", title="CasADi", folder=folder)), of)
 
 
 def _checked(module: ModuleType, of: GeneratedModel | None) -> SymbolicModel:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -157,18 +158,9 @@ class PointToPoint:
         return tuple(f"p{k}" for k in range(self.points))
 
     def joint(self, t: Array, p: Any, math: Any) -> States:
-        return _linear(self._basis(t), p, math)
-
-    def _basis(self, t: Array) -> tuple[Array, ...]:
-        slope = 1 / (self.travel - self.blend)
-        found = np.zeros((3, len(t), self.points))
-        found[0, :, 0] = 1.0
-        for k in range(self.points - 1):
-            start, stop = self.travel * k + self.blend / 2, self.travel * (k + 1) - self.blend / 2
-            bump = slope * (_corner(t - start, self.blend) - _corner(t - stop, self.blend))
-            found[:, :, k] -= bump
-            found[:, :, k + 1] += bump
-        return tuple(found)
+        half = self.blend / 2
+        ramps = [(self.travel * k + half, self.travel * (k + 1) - half) for k in range(self.points - 1)]
+        return _linear(_polyline(t, ramps, self.blend), p, math)
 
     def bounds(self) -> tuple[Array, Array]:
         return _free(len(self.names))
@@ -202,17 +194,8 @@ class Triangular:
         return tuple(f"p{k}" for k in range(self.points))
 
     def joint(self, t: Array, p: Any, math: Any) -> States:
-        return _linear(self._basis(t), p, math)
-
-    def _basis(self, t: Array) -> tuple[Array, ...]:
-        found = np.zeros((3, len(t), self.points))
-        found[0, :, 0] = 1.0
-        for k in range(self.points - 1):
-            start = self.blend / 2 + self.travel * k
-            piece = (_corner(t - start, self.blend) - _corner(t - start - self.travel, self.blend)) / self.travel
-            found[:, :, k] -= piece
-            found[:, :, k + 1] += piece
-        return tuple(found)
+        corners = self.blend / 2 + self.travel * np.arange(self.points)
+        return _linear(_polyline(t, list(pairwise(corners)), self.blend), p, math)
 
     def bounds(self) -> tuple[Array, Array]:
         return _free(len(self.names))
@@ -324,6 +307,17 @@ def _step(t: Array, width: float, sign: float = 1.0) -> tuple[Array, Array, Arra
     x = np.clip(t / width, 0.0, 1.0)
     speed, bend = 30 * x**2 * (1 - x) ** 2 / width, 60 * x * (1 - x) * (1 - 2 * x) / width**2
     return x**3 * (10 - 15 * x + 6 * x**2), sign * speed, bend
+
+
+def _polyline(t: Array, ramps: Sequence[tuple[float, float]], blend: float) -> tuple[Array, ...]:
+    """Basis of q, qd, qdd, shape (N, points) each: from point k to the next at constant velocity within ramps[k], whose corners are rounded."""
+    found = np.zeros((3, len(t), len(ramps) + 1))
+    found[0, :, 0] = 1.0
+    for k, (start, stop) in enumerate(ramps):
+        piece = (_corner(t - start, blend) - _corner(t - stop, blend)) / (stop - start)
+        found[:, :, k] -= piece
+        found[:, :, k + 1] += piece
+    return tuple(found)
 
 
 def _corner(u: Array, blend: float) -> Array:

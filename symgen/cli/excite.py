@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from symgen.cli.session import opened_model, progress_bar, reported_errors, single_thread, study_and_records, symbolic_file
+from symgen.cli.session import opened_model, progress_bar, reported_errors, single_thread, study_and_records, symbolic_file, yaml_text
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
@@ -193,7 +193,7 @@ def excitation_files(
         "report.html": render(excitation_page(model.NAME, verdict(summary), plots.svg(figure), summary)),
         "excitation.json": json_of(summary),
         "trajectory.csv": f"{header}\n{rows}\n",
-        "motion.yaml": _yaml({"motion": found.motion.to_mapping()}),
+        "motion.yaml": yaml_text({"motion": found.motion.to_mapping()}),
         "motion.png": plots.png(figure),
     }
 
@@ -203,16 +203,3 @@ def json_of(summary: dict[str, Any]) -> str:
     from runtime.estimate import json_text
 
     return json_text(summary)
-
-
-def _yaml(mapping: dict[str, Any]) -> str:
-    from io import StringIO
-
-    from ruamel.yaml import YAML
-
-    yaml: Any = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None
-    yaml.width = 140
-    stream = StringIO()
-    yaml.dump(mapping, stream)
-    return stream.getvalue()

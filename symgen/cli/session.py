@@ -151,8 +151,6 @@ def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
 
 def study_text(study: Study, folder: Path, destination: Path) -> str:
     """study.yaml: every setting, defaults included; files relative to `destination`, where the study is written."""
-    from ruamel.yaml import YAML
-
     from runtime.study import RecordSettings, to_mapping
 
     def moved(settings: RecordSettings) -> RecordSettings:
@@ -165,12 +163,19 @@ def study_text(study: Study, folder: Path, destination: Path) -> str:
     complete = replace(study, record=record, validate=replace(study.validate, record=further))
     if study.payload is not None:
         complete = replace(complete, payload=replace(study.payload, record=tuple(moved(s) for s in study.payload.record)))
+    return yaml_text(to_mapping(complete))
+
+
+def yaml_text(mapping: dict[str, Any]) -> str:
+    """A mapping as YAML, keys in their order, lists of numbers on one line."""
+    from ruamel.yaml import YAML
+
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False
     yaml.width = 140
     stream = StringIO()
-    yaml.dump(to_mapping(complete), stream)
+    yaml.dump(mapping, stream)
     return stream.getvalue()
 
 

@@ -35,6 +35,7 @@ def simulate(
     """
     single_thread()
     with reported_errors(), opened_model(robot) as model:
+        from runtime.estimate import json_text
         from runtime.io.records import read_records
         from runtime.io.study_files import study_of
         from runtime.reference import reference_of
@@ -87,6 +88,7 @@ def simulation_files(
     """Contents of the output folder: the record, a study that reads it back, figures of merit, the figure."""
     from dataclasses import replace
 
+    from runtime.estimate import json_text
     from runtime.report.plots import png, svg
     from runtime.report.simulation import simulation_figure
     from runtime.study import RecordSettings
@@ -128,9 +130,3 @@ def console_text(model: GeneratedModel, found: Simulation) -> str:
         share = f"{100 * found.saturated[row]:>7.2f} %  {100 * (np.abs(found.qd[:, row]) <= REST).mean():>6.2f} %"
         lines.append(f"{j:>5}  {rms:>10.3g}  {largest:>10.3g}  {effort:>10.4g}  {share}   ({position}, {torque})")
     return "\n".join(lines)
-
-
-def json_text(summary: dict[str, Any]) -> str:
-    import json
-
-    return json.dumps(summary, indent=2) + "\n"

@@ -123,7 +123,9 @@ def test_torque_limits_hold(planar: tuple) -> None:
     model, _, X = planar
     free = search(planar, settings())
     largest = np.abs(model.inverse_dynamics(*free.motion.sampled(1000.0)[1:], X)).max(axis=0)
-    asked = settings(limits={**LIMITS, "tau": (0.8 * largest).tolist()}, torque_rms=(0.5 * largest).tolist(), smooth=0.02)
+    asked = settings(
+        limits={**LIMITS, "tau": (0.8 * largest).tolist()}, torque_rms=(0.5 * largest).tolist(), smooth=0.02, iterations=200, starts=2
+    )
     found = search(planar, asked)
     tau = model.inverse_dynamics(*found.motion.sampled(1000.0)[1:], X)
     assert np.all(np.abs(tau).max(axis=0) <= 0.8 * largest)
