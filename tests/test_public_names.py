@@ -59,3 +59,10 @@ def test_import_symgen_is_light() -> None:
     assert dir(symgen) == sorted(symgen.__all__)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         symgen.nothing  # noqa: B018
+
+
+def test_regroup_is_a_function_to_its_users() -> None:
+    """The package of the same name stood in its place, whatever had been imported before."""
+    from symgen import certify, load_robot, regroup
+
+    assert certify(regroup(load_robot("planar_2r"))).valid
