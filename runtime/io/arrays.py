@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,10 +15,11 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class ArrayTable:
-    """Numeric arrays by name; (N, 1) and (1, N) are vectors, a single element is a scalar."""
+    """Numeric arrays by name; (N, 1) and (1, N) are vectors, a single element is a scalar. others : what else the file holds, by name."""
 
     file: str
     arrays: Mapping[str, Array]
+    others: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -26,7 +27,7 @@ class ArrayTable:
 
     def stack(self, names: Sequence[str]) -> Array:
         """The named vectors and the columns of the named matrices side by side, shape (N, k)."""
-        parts = [self._columns(name) for name in check_names(names, self.names, self.file)]
+        parts = [self._columns(name) for name in self._present(names)]
         lengths = {name: len(part) for name, part in zip(names, parts, strict=True)}
         if len(set(lengths.values())) > 1:
             raise InputError(f"columns of different lengths: {', '.join(f'{k} {v}' for k, v in lengths.items())}", file=self.file)
@@ -34,7 +35,7 @@ class ArrayTable:
 
     def scalar(self, name: str) -> float:
         """The single number called `name`."""
-        check_names([name], self.names, self.file)
+        self._present([name])
         if self.arrays[name].size != 1:
             raise InputError(f"{self.arrays[name].shape} values; expected a single number", file=self.file, column=name)
         return float(self.arrays[name].reshape(()))
@@ -42,12 +43,20 @@ class ArrayTable:
     def row(self, i: int) -> str:
         return f"sample {i + 1}"
 
+    def _present(self, names: Sequence[str]) -> Sequence[str]:
+        for name in names:
+            if name in self.others:
+                raise InputError(f"{self.others[name]}; expected an array of numbers", file=self.file, column=name)
+        return check_names(names, self.names, self.file)
+
     def _columns(self, name: str) -> Array:
         x = self.arrays[name]
         if x.ndim == 2 and x.shape[0] == 1:
             x = x.T
         if x.ndim > 2 or (x.ndim == 2 and x.shape[0] < x.shape[1]):
             raise InputError(f"shape {x.shape}; expected (N,) or (N, k), samples along the first axis", file=self.file, column=name)
+        if not x.size:
+            raise InputError("no samples", file=self.file, column=name)
         return x.reshape(len(x) if x.ndim else 1, -1).astype(float)
 
 

@@ -7,10 +7,12 @@ import hashlib
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, cast
 
 from runtime.errors import InputError
+from runtime.io.limits import allowed, require_size
 
 
 def read_bytes(path: Path) -> bytes:
@@ -22,7 +24,12 @@ def read_bytes(path: Path) -> bytes:
     if data[:2] != b"\x1f\x8b":
         return data
     try:
-        return gzip.decompress(data)
+        with gzip.GzipFile(fileobj=BytesIO(data)) as packed:
+            plain = packed.read(allowed(len(data)) + 1)
+        require_size(len(plain), len(data), str(path))
+        return plain
+    except InputError:
+        raise
     except (OSError, EOFError, zlib.error) as e:
         raise InputError(f"damaged gzip file ({e}); copy it again", file=str(path)) from e
 

@@ -1,21 +1,98 @@
-"""MATLAB files up to version 7."""
+"""MATLAB files: up to version 7 by scipy, version 7.3 (an HDF5 file) by h5py, the only place where it is used (extra `tables`).
+
+Numeric and logical arrays are read. Cells, structures, texts and sparse matrices are listed with their class and never loaded: a column of one is
+refused by name. Arrays of version 7.3 are stored by columns, so that h5py shows them transposed; they are turned back.
+"""
 
 from __future__ import annotations
 
+import struct
+import zlib
+from collections.abc import Mapping
 from io import BytesIO
+from typing import Any
 
+import numpy as np
 import scipy.io
 from scipy.io.matlab import MatReadError
 
 from runtime.errors import InputError
 from runtime.io.arrays import ArrayTable, numeric
+from runtime.io.limits import allowed, inflated, require_size
+
+NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))  # classes of MATLAB
+HEADER = 128  # bytes ahead of the elements of a file of version 5 to 7
+COMPRESSED = 15  # type of an element that holds a zlib stream
+HDF5 = b"\x89HDF\r\n\x1a\n"
+DAMAGED = (
+    *(MatReadError, OSError, EOFError, zlib.error, struct.error, MemoryError, RuntimeError),
+    *(ValueError, TypeError, KeyError, IndexError, AttributeError, AssertionError, ArithmeticError),
+)  # what scipy, h5py and what they read with raise on bytes that are no such file
+PLACES = (0, 512)  # where an HDF5 file may begin; MATLAB writes a text of 512 bytes first
 
 
 def read_mat(data: bytes, file: str) -> ArrayTable:
-    """Table of the bytes of a .mat file; structures and cells are left out."""
+    """Table of the bytes of a .mat file."""
+    if any(data[place : place + len(HDF5)] == HDF5 for place in PLACES):
+        return _read_hdf5(data, file)
     try:
-        return ArrayTable(file, numeric(scipy.io.loadmat(BytesIO(data))))
-    except NotImplementedError:
-        raise InputError("a MATLAB 7.3 file; save it with `save -v7`", file=file) from None
-    except (MatReadError, ValueError, TypeError, OSError, EOFError, KeyError, IndexError) as e:
+        _require_size(data, file)
+        classes = {name: kind for name, _, kind in scipy.io.whosmat(BytesIO(data))}
+        wanted = [name for name, kind in classes.items() if kind in NUMERIC]
+        arrays = numeric(scipy.io.loadmat(BytesIO(data), variable_names=wanted)) if wanted else {}
+    except InputError:
+        raise
+    except DAMAGED as e:
         raise InputError(f"not a MATLAB file ({e})", file=file) from e
+    return ArrayTable(file, arrays, {name: f"a MATLAB {kind}" for name, kind in classes.items() if name not in arrays})
+
+
+def _require_size(data: bytes, file: str) -> None:
+    """Raise InputError where the compressed elements of a file of version 7 unpack to more than a record holds."""
+    order = "<" if data[126:128] == b"IM" else ">"
+    place, total = HEADER, 0
+    while place + 8 <= len(data):
+        kind, size = struct.unpack_from(f"{order}II", data, place)
+        if kind == COMPRESSED:
+            total += inflated(memoryview(data)[place + 8 : place + 8 + size], allowed(len(data)) - total)
+            require_size(total, len(data), file)
+        place += 8 + size
+
+
+def _read_hdf5(data: bytes, file: str) -> ArrayTable:
+    try:
+        import h5py
+    except ImportError as e:
+        raise InputError("a MATLAB 7.3 file needs an optional library: pip install symgen[tables] (or save it with -v7)", file=file) from e
+    try:
+        with h5py.File(BytesIO(data), "r") as archive:
+            others = {name: reason for name in archive if (reason := _unreadable(archive, name, h5py)) and not name.startswith("#")}
+            wanted = {name: archive[name] for name in archive if name not in others and not name.startswith("#")}
+            require_size(sum(x.size * x.dtype.itemsize for x in wanted.values()), len(data), file)
+            return ArrayTable(file, {name: _array(x) for name, x in wanted.items()}, others)
+    except InputError:
+        raise
+    except DAMAGED as e:
+        raise InputError(f"not a MATLAB 7.3 file ({str(e).splitlines()[0] if str(e) else type(e).__name__})", file=file) from e
+
+
+def _unreadable(archive: Any, name: str, h5py: Any) -> str:
+    """Why a member of a file of version 7.3 is not an array of numbers; "" where it is one. Links to other files are not followed."""
+    if not isinstance(archive.get(name, getlink=True), h5py.HardLink):
+        return "a link"
+    x = archive[name]
+    attributes: Mapping[str, Any] = x.attrs
+    given = attributes.get("MATLAB_class", b"double")
+    kind = given.decode("ascii", "replace") if isinstance(given, bytes) else str(given)
+    if isinstance(x, h5py.Group):
+        return f"a MATLAB {'sparse matrix' if 'MATLAB_sparse' in attributes else 'struct'}"
+    if kind not in NUMERIC or x.dtype.kind not in "biuf":
+        return f"a MATLAB {kind if kind not in NUMERIC else x.dtype}"
+    if x.external is not None or x.is_virtual:
+        return "stored in another file"
+    return ""
+
+
+def _array(x: Any) -> np.ndarray:
+    """The numbers as MATLAB shows them; a mark says where an array is empty and its dimensions are stored in its place."""
+    return np.empty(0) if "MATLAB_empty" in x.attrs else np.asarray(x[()]).T

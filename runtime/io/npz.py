@@ -6,7 +6,9 @@ Fortran order is read through one open file per column.
 
 from __future__ import annotations
 
+import struct
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -19,18 +21,26 @@ from numpy.lib import format as npy
 
 from runtime.errors import InputError
 from runtime.io.arrays import ArrayBlock, ArrayTable, numeric
+from runtime.io.limits import require_size
 from runtime.io.naming import check_names
 
 Array = np.ndarray
 
-DAMAGED = (ValueError, OSError, EOFError, AttributeError, zipfile.BadZipFile)
+DAMAGED = (
+    *(ValueError, OSError, EOFError, AttributeError, zipfile.BadZipFile, zlib.error, struct.error),
+    *(NotImplementedError, RuntimeError, MemoryError, OverflowError),  # other compressions, passwords, shapes without the numbers
+)
 
 
 def read_npz(data: bytes, file: str) -> ArrayTable:
     """Table of the bytes of a .npz file."""
     try:
+        with zipfile.ZipFile(BytesIO(data)) as packed:
+            require_size(sum(member.file_size for member in packed.infolist()), len(data), file)
         with np.load(BytesIO(data), allow_pickle=False) as archive:
             return ArrayTable(file, numeric({name: archive[name] for name in archive.files}))
+    except InputError:
+        raise
     except DAMAGED as e:
         raise InputError(f"not an archive of plain arrays ({e})", file=file) from e
 
@@ -119,12 +129,12 @@ class ArrayBlocks:
         try:
             if self.whole is not None:
                 for k, x in enumerate(self.whole.blocks(size)):
-                    yield ArrayBlock(self.file, {str(i + 1): x[:, i] for i in range(x.shape[1])}, k * size)
+                    yield ArrayBlock(self.file, {str(i + 1): x[:, i] for i in range(x.shape[1])}, first=k * size)
                 return
             _, wanted = self._wanted(names)
             scalars = {name: next(x.blocks(1))[0] for name, x in self.arrays.items() if x.shape == () or x.samples == 1}
             for k, parts in enumerate(zip(*(x.blocks(size) for x in wanted.values()), strict=True)):
-                yield ArrayBlock(self.file, {**scalars, **dict(zip(wanted, parts, strict=True))}, k * size)
+                yield ArrayBlock(self.file, {**scalars, **dict(zip(wanted, parts, strict=True))}, first=k * size)
         except DAMAGED as e:
             if isinstance(e, InputError):
                 raise

@@ -50,7 +50,7 @@ class ParquetBlocks:
             for a in range(0, self.rows, step):
                 read = lazy.slice(a, step).collect().to_numpy()
                 for b in range(0, len(read), size):
-                    yield ArrayBlock(self.file, {name: read[b : b + size, i] for i, name in enumerate(wanted)}, a + b)
+                    yield ArrayBlock(self.file, {name: read[b : b + size, i] for i, name in enumerate(wanted)}, first=a + b)
         except (polars.exceptions.PolarsError, OSError) as e:
             raise InputError(f"damaged Parquet file ({_first_line(e)}); copy it again", file=self.file) from e
 

@@ -292,12 +292,6 @@ def test_damaged_files(tmp_path, name, data, said):
     assert said in str(e.value) and name in str(e.value)
 
 
-def test_matlab_73_says_what_to_do(tmp_path):
-    (tmp_path / "a.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(512))
-    with pytest.raises(InputError, match="save -v7"):
-        read_record(settings(files="a.mat"), folder=tmp_path)
-
-
 def test_settings_have_at_most_two_files():
     with pytest.raises(InputError, match="3 files"):
         RecordSettings(files=("a", "b", "c"))
