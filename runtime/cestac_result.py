@@ -29,11 +29,14 @@ import numpy as np
 from scipy.special import stdtrit
 
 from runtime.estimate import Estimate, aligned, json_text
+from runtime.latex import error_table, level_table
 from runtime.observation import Observation
 from runtime.runs import Runs
 
 Array = np.ndarray
 
+SCHEMA = "symgen-cestac/1"
+"""Kind and version of the JSON layout, published as runtime/schemas/cestac.schema.json (`symgen schema --of cestac`)."""
 NEGLIGIBLE = 1.0
 """%e below which the estimator is practically unbiased (chapter, section 3)."""
 BIASED = 5.0
@@ -151,6 +154,15 @@ class Cestac:
             lines.append((name + mark, *(f"{r.e[i]:.2f} ({r.relative_sigma[i]:.2f})" for r in self.levels)))
         return aligned(lines)
 
+    def to_latex(self) -> str:
+        """LaTeX (booktabs): the mean values as the chapter's Tables 3 and 4, then %e as its Table 7, each a tabular."""
+        labels, names, units = [r.level.label for r in self.levels], self.names, self.reference.units
+        mean, e = (np.array([getattr(r, name) for r in self.levels]).reshape(len(labels), len(names)) for name in ("mean", "e"))
+        residual = (r"\%e($\rho$)", np.array([r.e_rho for r in self.levels]))
+        increase = (r"increase of $\|\rho\|$ over $\|Y\|$", np.array([r.increase for r in self.levels]))
+        both = (residual, increase)
+        return f"{level_table(names, units, labels, mean, both)}\n{error_table(names, labels, e, both)}"
+
     def to_json(self) -> str:
         """JSON text of everything; every run included, up to LISTED of them."""
         return json_text(self.summary())
@@ -158,7 +170,7 @@ class Cestac:
     def summary(self) -> dict[str, Any]:
         """What `to_json` writes, as a mapping."""
         return {
-            "schema": 1,
+            "schema": SCHEMA,
             "names": self.names,
             "X_LS": self.reference.X,
             "relative_sigma_LS": self.reference.relative_sigma,

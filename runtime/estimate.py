@@ -15,17 +15,21 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from runtime.documents import document, read_document
+from runtime.errors import InputError
+from runtime.latex import parameter_table
+
 Array = np.ndarray
 
-SCHEMA = 1
-"""Version of the JSON layout."""
+SCHEMA = "symgen-estimate/1"
+"""Kind and version of the JSON layout, published as runtime/schemas/estimate.schema.json (`symgen schema --of estimate`)."""
 
 
 @dataclass(frozen=True)
@@ -148,25 +152,12 @@ class Estimate:
         )
 
     @classmethod
-    def from_json(cls, text: str) -> Estimate:
-        """The Estimate that `to_json` wrote."""
-        data = json.loads(text)
-        if data.get("schema") != SCHEMA:
-            raise ValueError(f"estimate.json has schema {data.get('schema')!r}; this version reads schema {SCHEMA}")
-        given = {f.name: data[f.name] for f in dataclasses.fields(cls) if f.name != "details" or f.name in data}
-        for name in ("X", "sigma", "sigma_corrected", "covariance"):
-            given[name] = np.array(given[name], dtype=float)
-        given["covariance"] = given["covariance"].reshape(len(data["names"]), len(data["names"]))
-        for name, missing in (
-            ("cond", math.inf),
-            ("cond_unit", math.inf),
-            *((n, math.nan) for n in ("sigma_rho", "residual_norm", "relative_error")),
-        ):
-            given[name] = missing if given[name] is None else given[name]
-        given["names"] = tuple(given["names"])
-        given["groups"] = tuple(tuple(group) for group in given["groups"])
-        given["per_joint"] = tuple(_joint_fit(fit) for fit in given["per_joint"])
-        return cls(**given)
+    def from_json(cls, text: str, *, file: str = "estimate.json") -> Estimate:
+        """The Estimate that `to_json` wrote, every number to the bit; what stands beside it (estimate.json of `symgen identify`) is left out.
+
+        Raises InputError where the text is no JSON, of another schema or incomplete; `file` is the name it gives.
+        """
+        return _estimate(document(text, SCHEMA, file), file)
 
     def to_table(self) -> str:
         """Plain text: one line per parameter, one per joint."""
@@ -186,15 +177,16 @@ class Estimate:
         note = ["", self.message] if self.message else []
         return "\n".join([*head, "", aligned(lines), "", aligned(joints), *note])
 
-    def to_latex(self, names: Sequence[str] | None = None) -> str:
-        """LaTeX tabular with the columns of the chapter's Table 2; `names` restricts and orders its lines."""
-        lines = [r"\begin{tabular}{lrr}", r"\hline", r"Mechanical parameters & Value & Relative deviation \%$\sigma$ \\", r"\hline"]
-        relative = self.relative_sigma
-        for name in self.names if names is None else names:
-            i = self.names.index(name)
-            unit = _latex_unit(self.units.get(name, ""))
-            lines.append(rf"{_latex_name(name)}{unit} & ${_latex_number(self.X[i])}$ & {_number(relative[i], '.3f')} \\")
-        return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
+    def to_latex(self, names: Sequence[str] | None = None, *, blocks: int = 1) -> str:
+        """LaTeX tabular (booktabs) as the chapter's Table 2; `names` restricts and orders its lines, `blocks` stand side by side."""
+        shown = self.names if names is None else tuple(names)
+        place = [self.names.index(name) for name in shown]
+        return parameter_table(shown, self.X[place], self.relative_sigma[place], self.units, blocks=blocks)
+
+
+def load_estimate(path: Path | str) -> Estimate:
+    """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote; InputError as `Estimate.from_json`."""
+    return _estimate(read_document(Path(path), SCHEMA), str(path))
 
 
 def aligned(lines: Sequence[Sequence[str]]) -> str:
@@ -240,30 +232,63 @@ def _render(value: Any, indent: str) -> str:
     return json.dumps(value, allow_nan=False, ensure_ascii=False)
 
 
+MISSING = {"cond": math.inf, "cond_unit": math.inf, "sigma_rho": math.nan, "residual_norm": math.nan, "relative_error": math.nan}
+"""What null stands for in the numbers of an Estimate; in an array it is nan."""
+
+
+def _estimate(data: Mapping[str, Any], file: str) -> Estimate:
+    """The fields of a document, whose kind and version are right; InputError names the one that is not."""
+    given: dict[str, Any] = {}
+    for f in dataclasses.fields(Estimate):
+        if f.name not in data:
+            raise InputError(f"no {f.name!r}; the file is incomplete", file=file)
+        try:
+            given[f.name] = _field(f.name, data[f.name])
+        except (TypeError, ValueError) as e:
+            raise InputError(f"{f.name}: {e}; the file was changed", file=file) from e
+    try:
+        return Estimate(**given)
+    except ValueError as e:
+        raise InputError(f"{e}; the file was changed", file=file) from e
+
+
+def _field(name: str, value: Any) -> Any:
+    if name in MISSING:
+        return MISSING[name] if value is None else float(value)
+    match name:
+        case "X" | "sigma" | "sigma_corrected" | "covariance":
+            array = np.array(value, dtype=float)
+            return array.reshape(0, 0) if name == "covariance" and not array.size else array
+        case "names":
+            return tuple(map(_text, value))
+        case "method" | "status" | "message":
+            return _text(value)
+        case "rank" | "iterations":
+            return int(value)
+        case "groups":
+            return tuple(tuple(map(_text, group)) for group in value)
+        case "per_joint":
+            return tuple(_joint_fit(fit) for fit in value)
+        case _:
+            return _mapping(value)
+
+
 def _joint_fit(data: Mapping[str, Any]) -> JointFit:
     known: dict[str, Any] = {key: math.nan if value is None else value for key, value in data.items()}
     return JointFit(**known)
 
 
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"found {value!r:.60}; expected a text")
+    return value
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ValueError(f"found {value!r:.60}; expected a mapping")
+    return value
+
+
 def _number(value: float, form: str) -> str:
     return format(value, form) if math.isfinite(value) else "-"
-
-
-def _latex_name(name: str) -> str:
-    found = re.fullmatch(r"([A-Za-z]+)(\d\w*)", name)
-    if found is None:
-        return rf"$\mathrm{{{name}}}$".replace("_", r"\_")
-    index = found[2].replace("_", r"\_")
-    return rf"$\mathrm{{{found[1]}}}_{{\mathrm{{{index}}}}}$"
-
-
-def _latex_unit(unit: str) -> str:
-    if not unit:
-        return ""
-    text = re.sub(r"(\*\*|\^)(-?\d+)", r"^{\2}", unit).replace("*", r"\,")
-    return rf" ($\mathrm{{{text}}}$)"
-
-
-def _latex_number(value: float) -> str:
-    text = f"{value:.4g}"
-    return re.sub(r"e([+-])0*(\d+)$", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)

@@ -34,7 +34,8 @@ def cestac(
     robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py).")],
     record: Annotated[str, typer.Argument(help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side).")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for cestac.json, report.html, the figure and study.yaml.")
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for report.html, cestac.json, .csv, .tex, .mat and .npz, the figure and study.yaml."),
     ] = None,
     delta: Annotated[list[str] | None, typer.Option(help="Position step, rad or m, such as 2*pi/5000; repeat for several.")] = None,
     torque: Annotated[list[str] | None, typer.Option(help="Motor torque step, N m or N; repeat for several.")] = None,
@@ -145,6 +146,7 @@ def verdict_sentence(result: Cestac) -> str:
 
 def resolution_files(result: Cestac, study: str, title: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
+    from runtime.exports import array_files, cestac_arrays, cestac_csv
     from runtime.report import plots
     from runtime.report.html import Page, Section, render
     from runtime.report.sections import resolution_section
@@ -152,6 +154,7 @@ def resolution_files(result: Cestac, study: str, title: str) -> dict[str, str | 
     settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
     page = Page(title=title, verdict=verdict_sentence(result), sections=[resolution_section(result), settings])
     files: dict[str, str | bytes] = {"report.html": render(page), "cestac.json": result.to_json(), "study.yaml": study}
+    files |= {"cestac.csv": cestac_csv(result), "cestac.tex": result.to_latex(), **array_files("cestac", cestac_arrays(result))}
     if any(level.level.delta and not level.level.torque for level in result.levels):
         figure = plots.error_against_resolution(result)
         files |= {"resolution.png": plots.png(figure), "resolution.svg": plots.svg(figure)}

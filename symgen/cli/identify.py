@@ -29,12 +29,17 @@ if TYPE_CHECKING:
     from runtime.model import GeneratedModel
     from runtime.study import Study
 
+ONE_BLOCK = 40  # lines of parameters.tex that one page holds; more stand in two blocks
+
 
 def identify(
     robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py).")],
     record: Annotated[str, typer.Argument(help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side).")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for report.html, estimate.json, figures, tables, study.yaml.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Folder for report.html, estimate.json (.mat, .npz), parameters.csv (.tex), figures, study.yaml."
+        ),
     ] = None,
     target: Annotated[str, typer.Option(help="numpy, or c: the regressor compiled.")] = "numpy",
     block: Annotated[
@@ -125,6 +130,7 @@ def estimate_json(found: Identification, more: Beside | None = None) -> str:
 
 def identification_files(found: Identification, study: str, more: Beside | None = None) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
+    from runtime.exports import array_files, estimate_arrays
     from runtime.report import plots
     from runtime.report.html import Page, Section, render
     from runtime.report.sections import identification_sections, parameters_csv, torque_unit
@@ -143,7 +149,8 @@ def identification_files(found: Identification, study: str, more: Beside | None 
         "report.html": render(page),
         "estimate.json": estimate_json(found, more),
         "parameters.csv": parameters_csv(found),
-        "parameters.tex": found.carried.to_latex(),
+        "parameters.tex": found.carried.to_latex(blocks=1 if len(found.carried.names) <= ONE_BLOCK else 2),
+        **array_files("estimate", estimate_arrays(found.every)),
         "study.yaml": study,
         "torques.png": plots.png(overlay),
         "torques.svg": plots.svg(overlay),

@@ -21,7 +21,7 @@ VERBS = {
     "datasets": "List the measured records this program knows, and where they lie.",
     "convert": "Write a robot in another format: .yaml, .par, .urdf.",
     "new": "Write a skeleton robot file.",
-    "schema": "Print the JSON Schema of robot files, for editors.",
+    "schema": "Print the JSON Schema of robot files, for editors, or of results.",
     "demo": "The main job end to end, with a report.",
 }
 

@@ -10,7 +10,9 @@ from typer.testing import CliRunner
 from runtime.checkpoint import Checkpoint
 from symgen.cli.cestac import cestac
 
-FILES = {"report.html", "cestac.json", "study.yaml", "resolution.png", "resolution.svg"}
+FILES = {"report.html", "study.yaml", "resolution.png", "resolution.svg"} | {
+    f"cestac.{kind}" for kind in ("json", "csv", "tex", "mat", "npz")
+}
 
 
 def run(*arguments):

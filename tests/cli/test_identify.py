@@ -14,7 +14,8 @@ from symgen.cli.identify import identify
 from symgen.cli.writing import write_all
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
-FILES = {"report.html", "estimate.json", "parameters.csv", "parameters.tex", "study.yaml", "torques.png", "torques.svg", "residuals.png"}
+FILES = {"report.html", "estimate.json", "estimate.mat", "estimate.npz", "parameters.csv", "parameters.tex"}
+FILES |= {"study.yaml", "torques.png", "torques.svg", "residuals.png"}
 
 
 def run(*arguments):
@@ -51,7 +52,7 @@ def test_files_are_complete_and_readable(emps):
     assert load_study(folder / "study.yaml").signals.lowpass.cutoff == 100
     assert "95.109" in (folder / "report.html").read_text(encoding="utf-8")
     assert (folder / "parameters.csv").read_text().splitlines()[1].startswith("M1R,95.10")
-    assert r"\hline" in (folder / "parameters.tex").read_text()
+    assert r"\toprule" in (folder / "parameters.tex").read_text()
 
 
 def test_study_written_is_the_study_run(emps, emps_data):

@@ -57,18 +57,13 @@ def test_json_holds_what_the_design_promises(found):
         "provenance",
     }
     assert promised <= set(data)
-    assert data["schema"] == 1
+    assert data["schema"] == "symgen-estimate/1"
     assert data["provenance"]["robot"] == "planar_2r_test" and data["provenance"]["seed"] == 1
     assert set(data["provenance"]["versions"]) == {"symgen", "numpy", "scipy"}
     assert data["provenance"]["files"] == {"q.csv": "ab" * 32}
     assert data["settings"]["estimate"]["method"] == "ols"
     assert data["settings"]["signals"] == {"median": 1}
     assert [fit["rows"] for fit in data["per_joint"]] == [300, 300]
-
-
-def test_other_schema_is_refused(found):
-    with pytest.raises(ValueError, match="schema 7"):
-        Estimate.from_json(found.to_json().replace('"schema": 1', '"schema": 7', 1))
 
 
 def test_json_text_leaves_brackets_in_texts_alone():
@@ -96,12 +91,3 @@ def test_table_is_aligned(found):
     assert {len(line) for line in table} == {len(table[0])}
     assert table[1].startswith("ZZ1R ") and table[1].endswith("kg*m**2")
     assert "relative error %" in str(found)
-
-
-def test_latex_has_the_columns_of_table_2(found):
-    text = found.to_latex(["ZZ1R", "FV1"])
-    assert text.startswith(r"\begin{tabular}{lrr}")
-    assert r"Mechanical parameters & Value & Relative deviation \%$\sigma$ \\" in text
-    assert r"$\mathrm{ZZ}_{\mathrm{1R}}$ ($\mathrm{kg\,m^{2}}$)" in text
-    assert text.count(r"\\") == 3
-    assert "FS1" not in text
