@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import typer
 
 from symgen.cli.session import origin, study_text
-from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
     from runtime.advice import Advice
     from runtime.model import GeneratedModel
     from runtime.record import Record
     from runtime.study import Study
+    from symgen.cli.writing import Results
 
 
 def advised(
@@ -24,7 +24,7 @@ def advised(
     folder: Path,
     records: Sequence[Record],
     asked: Sequence[float],
-    output: Path | None,
+    results: Results | None,
     json: bool,
 ) -> bool:
     """Print and write the advice; True where least squares would be biased at one of the steps asked for, or the runs contradict the prediction."""
@@ -44,12 +44,12 @@ def advised(
             progress=lambda done, total: bar.update(task, completed=done, total=total),
             provenance=origin(records),
         )
-    if output is not None:
+    if results is not None:
         title = f"{model.NAME}: encoder resolution advised on {', '.join(r.name for r in records)}"
-        write_all(output, advice_files(advice, study_text(study, folder, output), title))
+        results.write_all(advice_files(advice, study_text(study, folder, results.folder), title))
     typer.echo(advice.to_json() if json else f"{advice.to_table()}\n\n{advice.verdict}", nl=not json)
-    if output is not None:
-        typer.echo(f"report: {output / 'report.html'}", err=True)
+    if results is not None:
+        typer.echo(f"report: {results.folder / 'report.html'}", err=True)
     doubted = any(not limit.agrees for encoder in advice.encoders for limit in encoder.limits)
     return doubted or any(advice.worst(k)[1] > BIASED for k in range(len(asked)))
 

@@ -20,7 +20,7 @@ from symgen.cli.session import (
     study_and_records,
     study_text,
 )
-from symgen.cli.writing import write_all
+from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.cestac_result import Cestac
@@ -66,7 +66,7 @@ def cestac(
     single_thread()
     given = {"delta": delta, "torque": torque, "runs": runs, "rounding": rounding, "side": side, "seed": seed}
     given["columns"] = columns.split(",") if columns and "," in columns else _one_name(columns)
-    with reported_errors(), opened_model(robot) as model:
+    with reported_errors(), reserved(output) as results, opened_model(robot) as model:
         import runtime.cestac as study_of_resolution
         from runtime.checkpoint import Checkpoint
 
@@ -76,7 +76,7 @@ def cestac(
             from symgen.cli.advice import advised
 
             asked = study.cestac.delta if delta else ()
-            raise typer.Exit(NEGATIVE if advised(model, study, folder, records, asked, output, json) else 0)
+            raise typer.Exit(NEGATIVE if advised(model, study, folder, records, asked, results, json) else 0)
         checkpoint = None if output is None else Checkpoint(output)
         model = in_target(robot, model, target)
         with progress_bar("runs") as progress, kept_runs(checkpoint):
@@ -90,9 +90,9 @@ def cestac(
                 checkpoint=checkpoint,
                 provenance=origin(records),
             )
-        if output is not None:
+        if results is not None:
             title = f"{model.NAME}: encoder resolution on {', '.join(r.name for r in records)}"
-            write_all(output, resolution_files(result, study_text(study, folder, output), title))
+            results.write_all(resolution_files(result, study_text(study, folder, results.folder), title))
         if checkpoint is not None and result.lists_runs:
             checkpoint.remove()
         typer.echo(result.to_json() if json else console_text(result), nl=not json)

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from symgen.cli.session import SIMULATED_WARNING, opened_model, reported_errors, single_thread, study_text
-from symgen.cli.writing import write_all
+from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.model import GeneratedModel
     from runtime.record import Record
     from runtime.study import Study
     from symgen.cli.demonstration import Demonstration
+    from symgen.cli.writing import Results
 
 ROBOT, DATASET = "tx40", "tx40"
 SEED = 1
@@ -36,29 +37,29 @@ def demo(
 ) -> None:
     """Identify the Stäubli TX40 (or the haptic interface, simulated) and judge its encoder resolution, beside the published tables."""
     single_thread()
-    with reported_errors():
+    with reported_errors(), reserved(output) as results:
         if robot is Demo.haptic:
             from symgen.cli.demo_haptic import demo_haptic
 
-            demo_haptic(output, quick)
+            demo_haptic(results, quick)
         else:
-            demo_tx40(output, quick)
+            demo_tx40(results, quick)
 
 
-def demo_tx40(output: Path, quick: bool) -> None:
+def demo_tx40(results: Results, quick: bool) -> None:
     """The demo of the TX40."""
     with opened_model(ROBOT) as model:
         from symgen.cli.demonstration import demonstrate
 
-        study, record, extra, missing = measured_or_simulated(model, output, quick)
+        study, record, extra, missing = measured_or_simulated(model, results.folder, quick)
         if missing:
             typer.echo(
                 f"No measured record: {missing}\nContinuing on a SIMULATED record made on the spot; nothing below was measured.\n", err=True
             )
         shown = demonstrate(model, study, record, quick=quick, step=lambda text: typer.echo(f"  {text}", err=True))
-        write_all(output, {**demo_files(shown, study_text(shown.found.study, output, output)), **extra})
+        results.write_all({**demo_files(shown, study_text(shown.found.study, results.folder, results.folder)), **extra})
         typer.echo(verdict(shown))
-        typer.echo(f"report: {output / 'report.html'}")
+        typer.echo(f"report: {results.folder / 'report.html'}")
 
 
 def measured_or_simulated(model: GeneratedModel, output: Path, quick: bool) -> tuple[Study, Record, dict[str, bytes], str]:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import typer
 
 from symgen.cli.session import SIMULATED_WARNING, opened_model, origin, study_text
-from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from runtime.record import Record
     from runtime.rounding import Mode
     from runtime.study import Study
+    from symgen.cli.writing import Results
 
 ROBOT = "haptic"
 HANDLE = 4  # frame of the support of the handle
@@ -48,15 +48,15 @@ class HapticDemonstration:
         return self.roundings["two-point"]
 
 
-def demo_haptic(output: Path, quick: bool) -> None:
+def demo_haptic(results: Results, quick: bool) -> None:
     """The demo of the haptic interface; errors and threads are those of the verb."""
     with opened_model(ROBOT) as model:
         typer.echo("No record of this interface is public: this one is SIMULATED, nothing below was measured.\n", err=True)
         study, record, files = simulated_record(model, quick)
         shown = demonstrate(model, study, record, quick=quick, step=lambda text: typer.echo(f"  {text}", err=True))
-        write_all(output, {**demo_files(shown, study_text(study, output, output)), **files})
+        results.write_all({**demo_files(shown, study_text(study, results.folder, results.folder)), **files})
         typer.echo(verdict(shown))
-        typer.echo(f"report: {output / 'report.html'}")
+        typer.echo(f"report: {results.folder / 'report.html'}")
 
 
 def simulated_record(model: GeneratedModel, quick: bool) -> tuple[Study, Record, dict[str, bytes]]:

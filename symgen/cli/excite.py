@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from symgen.cli.session import opened_model, progress_bar, reported_errors, single_thread, study_and_records, symbolic_file, yaml_text
-from symgen.cli.writing import write_all
+from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.excitation import Limits, Weights
@@ -59,7 +59,7 @@ def excite(
     single_thread()
     given: dict[str, Any] = {"criterion": criterion, "starts": starts, "rate": rate, "seed": seed}
     given["columns"] = columns.split(",") if columns and columns not in ("essential", "all") else columns
-    with reported_errors(), opened_model(robot) as model:
+    with reported_errors(), reserved(output) as results, opened_model(robot) as model:
         from runtime.excitation import limits_of
         from runtime.excitation_settings import ExcitationSettings
         from runtime.mapping import structure
@@ -78,8 +78,8 @@ def excite(
             path = str(symbolic_file(robot, model))
             found = search(model, path, known.study, settings, known.weights, limits, known.X, workers=workers, progress=progress)
         summary = summary_of(model, found, known, settings, limits)
-        if output is not None:
-            write_all(output, excitation_files(model, found, known, limits, summary))
+        if results is not None:
+            results.write_all(excitation_files(model, found, known, limits, summary))
         typer.echo(json_of(summary) if json else console_text(summary), nl=not json)
         if output is not None:
             typer.echo(f"report: {output / 'report.html'}", err=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from symgen.cli.session import NEGATIVE, reported_errors, single_thread
-from symgen.cli.writing import write_all
+from symgen.cli.writing import reserved, write_all
 
 if TYPE_CHECKING:
     from symgen.cli.fleet_jobs import Done, Job, Row
@@ -33,7 +33,7 @@ def fleet(
     Exit code 1 where a job failed or a record does not determine its robot.
     """
     single_thread()
-    with reported_errors():
+    with reported_errors(), reserved(output) as results:
         from symgen.cli.fleet_jobs import jobs_of
 
         jobs = jobs_of(file)
@@ -44,8 +44,8 @@ def fleet(
             rows[done.row.name] = done.row
             typer.echo(f"{len(rows)} of {len(jobs)}  {done.row.name}: {done.row.status}", err=True)
         ordered = [rows[job.name] for job in jobs]
-        if output is not None:
-            write_all(output, summary_files(ordered))
+        if results is not None:
+            results.write_all(summary_files(ordered))
         typer.echo(summary_json(ordered) if json else summary_text(ordered), nl=not json)
     if any(row.status in ("failed", "rank-deficient") for row in ordered):
         raise typer.Exit(NEGATIVE)

@@ -21,7 +21,7 @@ from symgen.cli.session import (
     study_with_record,
     symbolic_file,
 )
-from symgen.cli.writing import write_all
+from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.closed_loop import Simulator
@@ -56,7 +56,7 @@ def identify(
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD. Exit code 1 where the record does not determine them."""
     single_thread()
-    with reported_errors(), opened_model(robot) as model:
+    with reported_errors(), reserved(output) as results, opened_model(robot) as model:
         from runtime.identification import identification
         from runtime.io.streams import records_or_streams
         from runtime.studies.compile_cache import processor
@@ -72,8 +72,8 @@ def identify(
             model, study, records, further=further, simulator=simulator_of(robot, model, study), provenance={**origin(records), **computed}
         )
         more = beside(model, study, folder, records, found, origin(records), physical=physical, friction=friction)
-        if output is not None:
-            write_all(output, identification_files(found, study_text(study, folder, output), more))
+        if results is not None:
+            results.write_all(identification_files(found, study_text(study, folder, results.folder), more))
         typer.echo(estimate_json(found, more) if json else console_text(found, more), nl=not json)
         if output is not None:
             typer.echo(f"report: {output / 'report.html'}", err=True)
@@ -101,10 +101,12 @@ def console_text(found: Identification, more: Beside | None = None) -> str:
         for key, fit in found.coupling.items()
     )
     fit = found.carried if found.every.status != "rank-deficient" else found.every
-    groups = "; ".join(", ".join(group) for group in found.weak.groups) or "none"
+    trading = [f"warning: {sentence}" for sentence in found.warnings] or [
+        f"no two parameters trade: no |correlation| above {found.weak.threshold:g}"
+    ]
     parts = [fit.to_table(), found.found.to_table(), *(part.to_table() for part in found.validation)]
     parts += [
-        f"parameters that trade against each other (|correlation| above {found.weak.threshold:g}): {groups}",
+        "\n".join(trading),
         weakest_text(found),
         found.trust.to_text(),
         coupling,

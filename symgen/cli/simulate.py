@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from symgen.cli.session import SIMULATED, fail, opened_model, reported_errors, single_thread, study_text, symbolic_file
-from symgen.cli.writing import write_all
+from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,7 +34,7 @@ def simulate(
     The record is written as `identify` reads it, with the reference in columns qr1 ...; study.yaml names it.
     """
     single_thread()
-    with reported_errors(), opened_model(robot) as model:
+    with reported_errors(), reserved(output) as results, opened_model(robot) as model:
         from runtime.estimate import json_text
         from runtime.io.records import read_records
         from runtime.io.study_files import study_of
@@ -53,8 +53,8 @@ def simulate(
         start = records[controller.reference.record].q[0] if controller.reference.record is not None and controller.start is None else None
         found = simulator.run(X, reference, ideal=ideal, start=start, name=f"{SIMULATED} {model.NAME}")
         summary = summary_of(model, found, X, ideal=ideal)
-        if output is not None:
-            write_all(output, simulation_files(model, found, summary, settings, output))
+        if results is not None:
+            results.write_all(simulation_files(model, found, summary, settings, results.folder))
         typer.echo(json_text(summary) if json else console_text(model, found), nl=not json)
 
 

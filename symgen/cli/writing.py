@@ -17,8 +17,9 @@ import shutil
 import socket
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
+from typing import overload
 
 from symgen.errors import SymgenError
 
@@ -93,15 +94,20 @@ def write_all(folder: Path, contents: Mapping[str, str | bytes]) -> list[Path]:
         return Results(folder).write_all(contents)
 
 
-@contextmanager
-def reserved(folder: Path | None) -> Iterator[Results | None]:
+@overload
+def reserved(folder: Path) -> AbstractContextManager[Results]: ...
+@overload
+def reserved(folder: Path | None) -> AbstractContextManager[Results | None]: ...
+def reserved(folder: Path | None) -> AbstractContextManager[Results | None]:
     """Keep other commands out of `folder`, made where it is missing, as long as the block lasts; None: nothing is to be written.
 
     Raises OutputError at once where another command holds the folder, or nothing can be written there.
     """
-    if folder is None:
-        yield None
-        return
+    return nullcontext() if folder is None else _reserved(folder)
+
+
+@contextmanager
+def _reserved(folder: Path) -> Iterator[Results]:
     with _made(folder), _locked(folder, 0.0):
         with _clear_errors(folder):
             Results(folder).recover()
