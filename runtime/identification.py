@@ -121,6 +121,11 @@ class Identification:
             f"unseen part of it to {self.predicted_error:.1f} %."
         )
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to look at before the values are used, in sentences: parameters that trade against each other, by name."""
+        return self.weak.warnings
+
     def summary(self) -> dict[str, Any]:
         """What estimate.json holds beside the Estimate of all parameters."""
         fit = self.found.estimate
@@ -141,6 +146,7 @@ class Identification:
                 "groups": self.weak.groups,
                 "directions": self.weak.directions,
             },
+            "warnings": self.warnings,
             "trust": self.trust.summary(),
             "coupling": {key: {"relative_error": e.relative_error, "per_joint": e.per_joint} for key, e in self.coupling.items()},
             "verdict": self.verdict,

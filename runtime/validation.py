@@ -214,6 +214,20 @@ class WeakDirections:
     def __str__(self) -> str:
         return self.to_table()
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One sentence per group: which parameters trade against each other, how strongly, and what to do."""
+        return tuple(self._warning(group) for group in self.groups)
+
+    def _warning(self, group: Sequence[str]) -> str:
+        strongest = max((p for p in self.pairs if p.first in group), key=lambda p: abs(p.correlation))
+        between = f"{strongest.first}, {strongest.second} " if len(group) > 2 else ""
+        return (
+            f"{' and '.join([', '.join(group[:-1]), group[-1]])} trade against each other on this record (correlation {between}"
+            f"{strongest.correlation:+.2f}): what they do together is known better than each value. Set one of them to a value known otherwise, or "
+            "record a motion that tells them apart (symgen excite)."
+        )
+
     def to_table(self) -> str:
         """Groups, pairs and directions as text."""
         lines: list[Sequence[str]] = [("pair", "correlation")]

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 import typer
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 from runtime.estimate import Estimate
 from runtime.io.study_files import load_study
 from symgen.cli.identify import identify
+from symgen.cli.main import app
 from symgen.cli.writing import write_all
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -49,6 +51,9 @@ def test_files_are_complete_and_readable(emps):
     _, folder = emps
     assert {path.name for path in folder.iterdir()} == FILES
     assert Estimate.from_json((folder / "estimate.json").read_text()).names == ("M1R", "FV1", "FS1", "OFFSET1")
+    written = json.loads((folder / "estimate.json").read_text())
+    jsonschema.validate(written, json.loads(CliRunner().invoke(app, ["schema", "--of", "estimate"]).stdout))
+    assert written["warnings"] == [] and written["weak_directions"]["groups"] == []
     assert load_study(folder / "study.yaml").signals.lowpass.cutoff == 100
     assert "95.109" in (folder / "report.html").read_text(encoding="utf-8")
     assert (folder / "parameters.csv").read_text().splitlines()[1].startswith("M1R,95.10")

@@ -78,12 +78,17 @@ def test_parameters_that_trade_are_named():
     assert found.directions[0].ratio < 1e-3
     assert np.isclose(sum(w**2 for w in found.directions[0].weights.values()), 1, atol=1e-3)
     assert "MX1R MY1" in str(found)
+    (warning,) = found.warnings
+    assert warning.startswith("MX1R and MY1 trade against each other on this record (correlation -1.00)") and "excite" in warning
     json.loads(found.to_json())
 
 
 def test_correlations_are_those_of_the_covariance():
     seen = observation(noise=(0.3, 0.05), seed=1)
     found = weak_directions(seen, EstimateSettings(method="wls"), threshold=0.2)
+    assert len(found.warnings) == len(found.groups) and all(
+        ", ".join(g[:-1]) in w for g, w in zip(found.groups, found.warnings, strict=True)
+    )
     C = estimate(seen, EstimateSettings(method="wls")).covariance
     for pair in found.pairs:
         i, k = seen.names.index(pair.first), seen.names.index(pair.second)
