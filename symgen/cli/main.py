@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -66,4 +68,19 @@ def symgen(version: bool = typer.Option(False, "--version", callback=_version, i
 
 def main() -> None:
     """Entry point of the command line."""
-    app()
+    _open_streams()
+    try:
+        app()
+    except OSError as e:  # help or version to a full disk; the verbs report their own
+        typer.echo(f"error: cannot print: {e.strerror or e}", err=True)
+        sys.exit(2)
+
+
+def _open_streams() -> None:
+    """Descriptors 0 to 2 are open, if on nothing: else a file of ours gets the number of a closed one, and what a library prints."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))

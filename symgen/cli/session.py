@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from runtime.study import Study
 
 BAD_INPUT, NEGATIVE = 2, 1
+BROKEN_PIPE = 141  # as shells have it: 128 + SIGPIPE
 SIMULATED = "SIMULATED"  # first word of the name of a record that was not measured
 SIMULATED_WARNING = (
     "Everything here was computed on a SIMULATED record, made from the values of the robot file with encoder steps and torque noise. "
@@ -42,14 +44,24 @@ def reported_errors() -> Iterator[None]:
         yield
     except (typer.Exit, typer.Abort):
         raise
+    except BrokenPipeError:
+        _stop_printing()
     except Exception as e:
         from runtime.errors import InputError  # not before it is needed: runtime takes most of a second to load
 
         if isinstance(e, InputError | SymgenError):
             fail(str(e))
         if isinstance(e, OSError):
-            fail(f"{e.filename or 'file'}: {e.strerror or e}")
+            fail(f"{e.filename or 'cannot print, or write a temporary file'}: {e.strerror or e}")
         raise
+
+
+def _stop_printing() -> NoReturn:
+    """The reader has enough, as `head` has: what is left to print goes nowhere, the end is quiet."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+    raise typer.Exit(BROKEN_PIPE)
 
 
 def fail(message: str) -> NoReturn:
