@@ -73,6 +73,7 @@ def checked_model(module: ModuleType) -> GeneratedModel:
     if missing:
         raise ModelError(f"no {', '.join(missing)}; expected an emitted model, emit it again", file=label)
     model = cast(GeneratedModel, module)
+    _check_names(model, label)
     require(model, *FUNCTIONS)
     n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
     if n == 0 or b == 0 or len(set(model.BASE_PARAMETERS)) != b:
@@ -104,6 +105,15 @@ def require(model: GeneratedModel, *functions: str) -> None:
     missing = [name for name in functions if not callable(getattr(model, name, None))]
     if missing:
         raise ModelError(f"no function {', '.join(missing)}; emit the model again with the target that has them", file=model.NAME)
+
+
+def _check_names(model: GeneratedModel, label: str) -> None:
+    """Names enter messages, tables, file names and symbols of compiled files: identifiers, and joints whole numbers."""
+    names = (model.NAME, *model.BASE_PARAMETERS)
+    if wrong := [name for name in names if not (isinstance(name, str) and re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII))]:
+        raise ModelError(f"NAME or BASE_PARAMETERS hold {wrong[0]!r:.60}; expected identifiers", file=label)
+    if strange := [j for j in model.JOINTS if type(j) is not int or j < 1]:
+        raise ModelError(f"JOINTS hold {strange[0]!r:.60}; expected numbers of joints", file=label)
 
 
 def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:

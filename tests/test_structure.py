@@ -23,7 +23,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "typer": ("symgen/cli/",),
     "rich": ("symgen/cli/",),
     "pydantic": ("symgen/description/",),
-    "ruamel": ("symgen/description/", "symgen/cli/", "runtime/io/study_files.py"),
+    "ruamel": ("symgen/description/", "symgen/cli/", "runtime/io/study_files.py", "runtime/io/yaml_text.py"),
     "sympy": ("symgen/regroup/symbolic.py",),
     "mpmath": ("symgen/derive/precise.py", "symgen/regroup/general.py"),
     "casadi": ("symgen/derive/lagrange.py", "runtime/studies/simulation", "runtime/studies/excitation.py", "generated/"),
@@ -145,6 +145,23 @@ def test_nothing_runs_text_as_code(name: str) -> None:
     builtins = {n.func.id for n in ast.walk(TREES[name]) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)}
     assert not builtins & FORBIDDEN_CALLS and not called & {"sympify", "parse_expr"}
     assert not {m.split(".")[0] for m in imports(name)} & {"pickle", "marshal", "shelve", "dill", "cloudpickle"}
+
+
+READERS = {"load", "full_load", "unsafe_load", "read_pickle", "Unpickler", "from_file", "fromfile", "memmap"}
+LIBRARIES = {"np", "numpy", "yaml", "ruamel", "torch", "joblib", "pandas", "pl"}
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_nothing_is_unpickled(name: str) -> None:
+    """No library turns a file into objects by running what it holds: numpy.load says allow_pickle=False, YAML makes plain data."""
+    for call in (n for n in ast.walk(TREES[name]) if isinstance(n, ast.Call)):
+        said = {k.arg: k.value.value for k in call.keywords if isinstance(k.value, ast.Constant)}
+        called, place = ast.unparse(call.func), f"{name}, line {call.lineno}"
+        if called.rpartition(".")[2] in READERS and called.partition(".")[0] in LIBRARIES:
+            assert called == "np.load" and said.get("allow_pickle") is False, place
+        assert not said.get("allow_pickle"), place
+        if called.rpartition(".")[2] == "YAML":
+            assert said.get("typ") in ("safe", "rt"), place
 
 
 def test_no_utils() -> None:

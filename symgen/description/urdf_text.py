@@ -201,6 +201,8 @@ def _joint(e: Element, nearly: float) -> Joint:
     given = e.first("axis")
     axis = np.array([1.0, 0.0, 0.0]) if given is None else given.numbers("xyz", 3, "1 0 0")
     length = float(np.linalg.norm(axis))
+    if kind == FIXED_TYPE:
+        axis, length = np.array([0.0, 0.0, 1.0]), 1.0  # of no meaning; some files say 0 0 0
     if length < 1e-6:
         raise DescriptionError(f"joint {name!r}: axis {axis.tolist()} has no direction", line=(given or e).line)
     limit, dynamics, mimic = (e.first(tag) for tag in ("limit", "dynamics", "mimic"))

@@ -133,9 +133,9 @@ def test_files_no_emitter_writes(tmp_path, text):
 @pytest.mark.parametrize(
     "text",
     [
-        "x = 1\ny: float = 2.0",
+        "x = 1\ny = 2.0",
         "def f(q, *, out=None):\n    '''Sum.'''\n    if out is None:\n        raise ValueError(f'{q} no')\n    return np.linalg.solve(q, out)",
-        "class Store:\n    __slots__ = ('a',)\n    def __init__(self, a):\n        self.a = a\nx = Store(np.zeros(3)).a",
+        "class Store(np.ndarray):\n    ready = False\n    def __array_finalize__(self, parent):\n        self.ready = False\nx = np.zeros(3).view(Store)",
         "T = {name: i for i, name in enumerate(('A', 'B'))}\nS = np.array([[True]])",
         "def f(x):\n    for i in range(3):\n        x = x + i\n    return max(x, 0)",
     ],
