@@ -12,6 +12,8 @@ from symgen.cli.session import fail, reported_errors
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
+    from rich.text import Text
+
     from symgen.regroup.regrouping import BaseParameter, Regrouping
 
 FORMATS = ("text", "latex", "json")
@@ -27,8 +29,12 @@ def show(
         bool, typer.Option("--html", help="One page to look at: the robot in 3D, its frames and formulas; no network.")
     ] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="File of the page; <name>.html where left out.")] = None,
+    ascii: Annotated[bool, typer.Option("--ascii", help="On a terminal too, names as robot files and modules write them: ZZ1R.")] = False,
 ) -> None:
-    """Print the base parameters of ROBOT, what they are made of, what has no effect, and what the models cost."""
+    """Print the base parameters of ROBOT, what they are made of, what has no effect, and what the models cost.
+
+    On a terminal in colour and with subscripts; plain text where it is piped, or with NO_COLOR set.
+    """
     with reported_errors():
         if html and (only or recursive or json or format != "text"):
             fail("--html shows everything; leave out --format, --only, --recursive and --json")
@@ -51,8 +57,10 @@ def show(
             fail(
                 f"{only!r} is no base parameter of {regrouping.robot.name}; close: {', '.join(close) or 'none'} (all: symgen show {robot})"
             )
+        if kind == "text" and print_coloured(regrouping, only, recursive, ascii):
+            return
         if recursive:
-            typer.echo(recursive_text(regrouping))
+            typer.echo("\n".join(f"{name} = {text}" for name, text in recursive_formulas(regrouping)))
         else:
             typer.echo({"text": flat_text, "latex": latex_text, "json": json_text}[kind](regrouping, only))
 
@@ -84,18 +92,50 @@ def flat_text(regrouping: Regrouping, only: str | None) -> str:
             lines += wrapped(f"{b.name:<{width}} = {b.formula}", "", " " * (width + 3))
     if only:
         return "\n".join(lines)
-    robot = regrouping.robot
-    head = f"{robot.title or robot.name}: {len(regrouping)} base parameters of {len(robot.parameters)}, {regrouping.method}"
     alone = " ".join(b.name for b in base if b.name == b.own)
-    operations = [f"  {name:<26} {cost['mul']:>5} multiplications {cost['add']:>5} additions" for name, cost in costs(regrouping).items()]
     return "\n".join(
-        [head, "", *lines, "", *wrapped("as they are: " + alone, ""), "", *wrapped("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""), "",
-         "operations per sample", *operations]
+        [title(regrouping), "", *lines, "", *wrapped("as they are: " + alone, ""), "", *wrapped("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""), "",
+         "operations per sample", *operation_lines(regrouping)]
     )  # fmt: skip
 
 
-def recursive_text(regrouping: Regrouping) -> str:
-    """One line per parameter that receives others, in terms of what those had already received: XXR_i = XX_i + YYR_j + ..."""
+def print_coloured(regrouping: Regrouping, only: str | None, recursive: bool, ascii: bool) -> bool:
+    """Print for a reader at a terminal; False where there is none."""
+    from symgen.cli.formula_text import FormulaText, terminal
+
+    console = terminal()
+    if console is None:
+        return False
+    robot = regrouping.robot
+    plain = ascii or not console.encoding.startswith("utf")
+    text = FormulaText(robot, console.width, ascii=plain)
+    base = chosen(regrouping, only)
+    formulas = recursive_formulas(regrouping) if recursive else [(b.name, b.formula) for b in base if only or b.name != b.own]
+    column = max((len(name) for name, _ in formulas), default=0)
+    lines: list[Text | str] = [text.definition(name, formula, column) for name, formula in formulas]
+    if not only and not recursive:
+        console.print(title(regrouping), style="bold", markup=False)
+        alone = [b.name for b in base if b.name == b.own]
+        lists = [text.listed(head, names) for head, names in (("as they are", alone), ("no effect", regrouping.no_effect)) if names]
+        lines = ["", *lines, "", *lists, "", text.legend(), "", "operations per sample", *operation_lines(regrouping)]
+    for line in lines:
+        console.print(line, soft_wrap=True, markup=False)
+    return True
+
+
+def title(regrouping: Regrouping) -> str:
+    """What the robot is and how many of its parameters are base ones."""
+    robot = regrouping.robot
+    return f"{robot.title or robot.name}: {len(regrouping)} base parameters of {len(robot.parameters)}, {regrouping.method}"
+
+
+def operation_lines(regrouping: Regrouping) -> list[str]:
+    """A line per model."""
+    return [f"  {name:<26} {cost['mul']:>5} multiplications {cost['add']:>5} additions" for name, cost in costs(regrouping).items()]
+
+
+def recursive_formulas(regrouping: Regrouping) -> list[tuple[str, str]]:
+    """(name, formula) per parameter that receives others, in terms of what those had already received: XXR_i = XX_i + YYR_j + ..."""
     from symgen.description.expression import ONE
     from symgen.regroup.regrouping import formula
 
@@ -112,8 +152,8 @@ def recursive_text(regrouping: Regrouping) -> str:
     for p in reversed(regrouping.robot.parameters):
         if p in received:
             terms = {p: ONE} | {name(source): c for source, c in received[p].items() if c}
-            lines.append(f"{name(p)} = {formula(terms)}")
-    return "\n".join(lines)
+            lines.append((name(p), formula(terms)))
+    return lines
 
 
 def latex_text(regrouping: Regrouping, only: str | None) -> str:

@@ -12,9 +12,8 @@ from html import escape
 
 from symgen.description.expression import ONE, Call, Expression, decimal
 from symgen.regroup.regrouping import shared
-from symgen.report.symbols import symbol
+from symgen.report.symbols import GREEK, symbol
 
-GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "pi": "π"}
 MINUS = "−"
 
 
