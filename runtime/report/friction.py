@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from runtime.friction import FrictionCurve
 from runtime.report import plots
 from runtime.report.html import Image, Section, Table
-from runtime.report.sections import number
+from runtime.report.markup import number
 
 
 def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figure:

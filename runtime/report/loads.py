@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from runtime.loads import Loads
 from runtime.report.html import Section, Table
-from runtime.report.sections import number
+from runtime.report.markup import number
 
 
 def loads_section(found: Loads) -> Section:

@@ -7,7 +7,7 @@ import io
 
 from runtime.estimate import Estimate, aligned
 from runtime.report.html import Section, Table
-from runtime.report.sections import number
+from runtime.report.markup import number
 
 
 def physical_section(fit: Estimate) -> Section:

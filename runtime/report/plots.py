@@ -16,6 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from runtime.cestac_result import BIASED, NEGLIGIBLE, Cestac
+from runtime.report.series import gaps
 from runtime.validation import Comparison, JointComparison
 
 BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = "#000000", "#0072B2", "#D55E00", "#007A5A", "#AA4499", "#56B4E9", "#9A9A9A"
@@ -46,14 +47,20 @@ def png(figure: Figure) -> bytes:
 
 
 def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "measured") -> Figure:
-    """Measured and predicted torque of one joint, and their difference (chapter, Fig. 4). source : "measured" or "simulated"."""
+    """Measured and predicted torque of one joint, and their difference below (chapter, Fig. 4). source : "measured" or "simulated"."""
     with mpl.rc_context(STYLE):
-        figure, (axes,) = panels_figure(1, 1, (5.4, 2.8))
-        _overlay(axes, joint, unit, source)
-        axes.set_title("")
-        axes.set_title(_title(joint), fontsize=9, loc="right")
-        axes.legend(
-            ncols=3, loc="lower left", bbox_to_anchor=(-0.02, 1.0), fontsize=8, handlelength=2.0, columnspacing=1.0, borderaxespad=0.2
+        figure = empty_figure((5.4, 3.4))
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        t, measured, predicted, error = _broken(joint)
+        upper.plot(t, measured, color=BLACK, linewidth=1.5, label=source)
+        upper.plot(t, predicted, color=ORANGE, linewidth=1.0, linestyle=(0, (4, 1)), label="predicted")
+        lower.plot(t, error, color=BLUE, linewidth=0.7, label="error")
+        upper.set_ylabel(f"torque, {unit}")
+        lower.set_ylabel(f"error, {unit}")
+        lower.set_xlabel("time, s")
+        upper.set_title(_title(joint), fontsize=9, loc="right")
+        upper.legend(
+            ncols=2, loc="lower left", bbox_to_anchor=(-0.02, 1.0), fontsize=8, handlelength=2.0, columnspacing=1.0, borderaxespad=0.2
         )
     return figure
 
@@ -153,10 +160,8 @@ def _title(joint: JointComparison) -> str:
 
 
 def _broken(joint: JointComparison) -> tuple[np.ndarray, ...]:
-    steps = np.diff(joint.t)
-    usual = float(np.median(np.abs(steps))) if len(steps) else 0.0
-    gaps = np.flatnonzero((steps <= 0) | (steps > 5 * usual)) + 1
-    return tuple(np.insert(np.asarray(x, dtype=float), gaps, np.nan) for x in (joint.t, joint.measured, joint.predicted, joint.error))
+    holes = gaps(joint.t)
+    return tuple(np.insert(np.asarray(x, dtype=float), holes, np.nan) for x in (joint.t, joint.measured, joint.predicted, joint.error))
 
 
 def _sharpest(result: Cestac) -> list[str]:
@@ -170,9 +175,14 @@ def _drawn(values: np.ndarray) -> np.ndarray:
 
 
 def panels_figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    figure = empty_figure(size)
+    return figure, list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
+
+
+def empty_figure(size: tuple[float, float]) -> Figure:
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
-    return figure, list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
+    return figure
 
 
 def _rendered(figure: Figure, form: str) -> bytes:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Sequence
 
 from runtime.cestac_result import Cestac
-from runtime.estimate import Estimate
 from runtime.identification import Identification
 from runtime.report import plots
-from runtime.report.html import Image, Section, Table
+from runtime.report.html import Image, Number, Section, State, Table
+from runtime.report.markup import number
+from runtime.report.parameters import parameter_section
+from runtime.report.residuals import residual_section
+from runtime.report.series import series
 from runtime.report.trust import trust_section
+from runtime.report.weak import weak_section
 
 MEANING = {
     "both": "position and torque (used where the settings say so)",
@@ -22,11 +25,6 @@ MEANING = {
 }
 
 
-def number(value: float, form: str = ".4g") -> str:
-    """A number, or - where there is none."""
-    return format(value, form) if math.isfinite(value) else "-"
-
-
 def torque_unit(found: Identification) -> str:
     """N for a robot whose joints are all prismatic by their units, else N m."""
     units = set(dict(getattr(found.model, "UNITS", {})).values())
@@ -34,25 +32,31 @@ def torque_unit(found: Identification) -> str:
 
 
 def identification_sections(found: Identification) -> list[Section]:
-    """Torques, errors per joint, parameters, trail, validation, weak directions, coupling."""
-    sections = [torque_section(found), joint_section(found), parameter_section(found), trail_section(found), validation_section(found)]
+    """Parameters, torques, errors per joint, residuals, weak directions, trust, trail, validation, coupling."""
+    unit = torque_unit(found)
     return [
-        *sections,
+        parameter_section(found),
+        torque_section(found),
+        joint_section(found),
+        residual_section(found, unit),
         weak_section(found),
-        trust_section(found.trust, torque_unit(found)),
+        trust_section(found.trust),
+        trail_section(found),
+        validation_section(found),
         *([coupling_section(found)] if found.coupling else []),
     ]
 
 
 def torque_section(found: Identification) -> Section:
-    """Fig. 4 of the chapter, one figure per joint."""
+    """Fig. 4 of the chapter, one figure per joint, which a script lets zoom."""
     unit = torque_unit(found)
     which = "the essential" if found.carried is found.found.estimate else "all"
     images = [
         Image(
-            f"Joint {joint.joint}: {found.source}, predicted by {which} parameters, and error; {joint.relative_error:.2f} % of the {found.source} norm",
+            f"Joint {joint.joint}: {found.source}, predicted by {which} parameters, and error below; {joint.relative_error:.2f} % of the {found.source} norm",
             plots.svg(plots.joint_overlay(joint, unit, found.source)),
-            f"Torque of joint {joint.joint} against time: {found.source}, predicted, error",
+            f"Torque of joint {joint.joint} against time: {found.source}, predicted, error; error {joint.relative_error:.1f} %",
+            series(joint, unit, found.source),
         )
         for joint in found.comparison
     ]
@@ -61,6 +65,9 @@ def torque_section(found: Identification) -> Section:
         if found.in_part
         else []
     )
+    thinned = max((image.series.total - len(image.series.t) for image in images if image.series is not None), default=0)
+    if thinned > 0:
+        text.append("Long records: the lines keep the largest and smallest value of every stretch and leave the instants between out.")
     return Section(f"{found.source.capitalize()} and predicted torques", text, images)
 
 
@@ -79,29 +86,7 @@ def joint_section(found: Identification) -> Section:
         "essential ones. The error is 100 ||Y - W X|| / ||Y||.",
         *([every.message] if every.message else []),
     )
-    image = Image(
-        "Residuals of the essential parameters over their deviation; line: normal law",
-        plots.svg(plots.residual_histogram(found.comparison, torque_unit(found))),
-        "Histograms of the residuals, joint by joint",
-    )
-    return Section("Errors in total and per joint", text, [image], [Table("Relative error by joint", header, rows)])
-
-
-def parameter_section(found: Identification) -> Section:
-    """Values with their deviations: essential ones, then all."""
-    text = (
-        "sigma is eq. (10), which takes residuals as independent; filtered ones are not, and the corrected deviation takes blocks of time as "
-        "independent instead. It is the one to trust.",
-    )
-    kept = _parameter_table(f"{len(found.found.names)} essential parameters, fitted alone", found.found.estimate)
-    return Section("Parameters", text, tables=[kept, _parameter_table(f"All {len(found.every.names)} parameters", found.every)])
-
-
-def _parameter_table(caption: str, fit: Estimate) -> Table:
-    header = ("parameter", "value", "sigma", "%sigma", "corrected sigma", "unit")
-    columns = zip(fit.names, fit.X, fit.sigma, fit.relative_sigma, fit.sigma_corrected, strict=True)
-    rows = [(n, number(x, ".5g"), number(s, ".2g"), number(p, ".2f"), number(c, ".2g"), fit.units.get(n, "")) for n, x, s, p, c in columns]
-    return Table(caption, header, rows)
+    return Section("Errors in total and per joint", text, tables=[Table("Relative error by joint", header, rows)])
 
 
 def trail_section(found: Identification) -> Section:
@@ -143,25 +128,6 @@ def validation_section(found: Identification) -> Section:
         tables.append(Table("Relative error, %", ("part", "parameters", "use", "total", *(f"joint {j}" for j in part.joints)), rows))
     text = ("Parameters fitted on one part of the data predict the torques of another; the essential names are those of the whole record.",)
     return Section("Cross-validation", text, tables=tables)
-
-
-def weak_section(found: Identification) -> Section:
-    """Parameters that trade against each other, by name."""
-    weak = found.weak
-    groups = "; ".join(", ".join(group) for group in weak.groups) or "none"
-    pairs = Table(
-        f"Pairs with |correlation| above {weak.threshold:g}",
-        ("first", "second", "correlation"),
-        [(p.first, p.second, f"{p.correlation:+.3f}") for p in weak.pairs],
-    )
-    directions = Table(
-        "Directions that W sees least (columns of norm 1)",
-        ("singular value ratio", "combination"),
-        [(f"{d.ratio:.2e}", " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items())) for d in weak.directions],
-    )
-    return Section(
-        "Parameters that trade against each other", (f"Groups: {groups}.",), tables=[*([pairs] if weak.pairs else []), directions]
-    )
 
 
 def coupling_section(found: Identification) -> Section:
@@ -227,6 +193,12 @@ def resolution_section(
         *(f"{r.level.label}: {r.message}" for r in result.levels),
     )
     return Section(title, text, [image] if image else [], tables)
+
+
+def level_numbers(result: Cestac) -> list[Number]:
+    """The verdict of every step, for the head of a page."""
+    states: dict[str, State] = {"unbiased": "good", "doubtful": "doubtful", "biased": "no"}
+    return [Number(r.level.label, r.verdict, states[r.verdict]) for r in result.levels]
 
 
 def parameters_csv(found: Identification) -> str:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from runtime.operational_space import OperationalSpace
 from runtime.report import plots
 from runtime.report.html import Image, Section, Table
-from runtime.report.sections import number
+from runtime.report.markup import number
 
 Array = np.ndarray
 

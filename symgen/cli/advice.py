@@ -56,17 +56,18 @@ def advised(
 
 def advice_files(advice: Advice, study: str, title: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
-    from runtime.report import plots
-    from runtime.report.advice import advice_figure, advice_section
-    from runtime.report.html import Page, Section, render
+    from runtime.report.advice import advice_section
+    from runtime.report.html import Page, render
+    from symgen.cli.pages import settings_section
 
-    settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
-    page = Page(title=title, verdict=advice.verdict, sections=[advice_section(advice), settings])
+    page = Page(title=title, verdict=advice.verdict, sections=[advice_section(advice), settings_section(study)])
+    return {"report.html": render(page), "study.yaml": study, **advice_figures(advice)}
+
+
+def advice_figures(advice: Advice) -> dict[str, str | bytes]:
+    """advice.json and the figure, by file name."""
+    from runtime.report import plots
+    from runtime.report.advice import advice_figure
+
     figure = advice_figure(advice)
-    return {
-        "report.html": render(page),
-        "advice.json": advice.to_json(),
-        "study.yaml": study,
-        "advice.png": plots.png(figure),
-        "advice.svg": plots.svg(figure),
-    }
+    return {"advice.json": advice.to_json(), "advice.png": plots.png(figure), "advice.svg": plots.svg(figure)}

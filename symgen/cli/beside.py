@@ -1,4 +1,4 @@
-"""What `symgen identify` says beside the parameters: physical consistency, a load, friction curves; text, JSON, sections and files of each."""
+"""What is said beside the parameters: physical consistency, a load, friction curves, encoder resolution; text, JSON, sections and files of each."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from runtime.advice import Advice
+    from runtime.cestac_result import Cestac
     from runtime.estimate import Estimate
     from runtime.feasibility import Feasibility
     from runtime.friction import FrictionCurve
@@ -22,13 +24,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """fit : all parameters; a feasible one has its own eigenvalues.   judged : of another method, where asked.   unit : of torques."""
+    """fit : all parameters; a feasible one has its own eigenvalues.   judged : of another method, where asked.   unit : of torques.
+
+    missing : parts that were asked for and could not be done, each with its reason.
+    """
 
     fit: Estimate
     unit: str
     judged: Feasibility | None = None
     loads: Loads | None = None
     friction: tuple[FrictionCurve, ...] = ()
+    advice: Advice | None = None
+    resolution: Cestac | None = None
+    missing: tuple[str, ...] = ()
 
     @property
     def feasible(self) -> bool:
@@ -46,7 +54,10 @@ class Beside:
             parts.append(f"The parameters are {self.judged.text}.")
         if self.loads is not None:
             parts.append(self.loads.to_table())
-        return "\n\n".join([*parts, *(curve.to_table() for curve in self.friction)])
+        parts += [curve.to_table() for curve in self.friction]
+        parts += [] if self.advice is None else [self.advice.verdict]
+        parts += [] if self.resolution is None else [self.resolution.to_table()]
+        return "\n\n".join([*parts, *self.missing])
 
     def summary(self) -> dict[str, Any]:
         """Entries of estimate.json."""
@@ -60,25 +71,34 @@ class Beside:
 
     def sections(self) -> list[Section]:
         """Sections of the report."""
+        from runtime.report.advice import advice_section
         from runtime.report.friction import friction_section
         from runtime.report.html import Section
         from runtime.report.loads import loads_section
         from runtime.report.physical import physical_section
+        from runtime.report.sections import resolution_section
 
         sections = [physical_section(self.fit)] if self.feasible else []
         if self.judged is not None:
             sections.append(Section("Physical consistency", (f"The parameters are {self.judged.text}.",)))
         sections += [] if self.loads is None else [loads_section(self.loads)]
-        return [*sections, *([friction_section(self.friction, self.unit)] if self.friction else [])]
+        sections += [friction_section(self.friction, self.unit)] if self.friction else []
+        sections += [] if self.advice is None else [advice_section(self.advice)]
+        sections += [] if self.resolution is None else [resolution_section(self.resolution, "Resolution study")]
+        return [*sections, *([Section("Not done", self.missing)] if self.missing else [])]
 
     def files(self) -> dict[str, str | bytes]:
         """Further files of the output folder."""
         from runtime.report import plots
         from runtime.report.friction import friction_figure
         from runtime.report.physical import standard_csv
+        from symgen.cli.advice import advice_figures
+        from symgen.cli.cestac import resolution_figures
 
         found: dict[str, str | bytes] = {"standard_parameters.csv": standard_csv(self.fit)} if self.feasible else {}
-        return {**found, **({"friction.png": plots.png(friction_figure(self.friction, self.unit))} if self.friction else {})}
+        found |= {"friction.png": plots.png(friction_figure(self.friction, self.unit))} if self.friction else {}
+        found |= {} if self.advice is None else advice_figures(self.advice)
+        return {**found, **({} if self.resolution is None else resolution_figures(self.resolution))}
 
 
 def beside(

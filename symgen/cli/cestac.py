@@ -146,15 +146,22 @@ def verdict_sentence(result: Cestac) -> str:
 
 def resolution_files(result: Cestac, study: str, title: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
+    from runtime.report.html import Page, render
+    from runtime.report.sections import level_numbers, resolution_section
+    from symgen.cli.pages import settings_section
+
+    sections = [resolution_section(result), settings_section(study)]
+    page = Page(title=title, verdict=verdict_sentence(result), sections=sections, numbers=level_numbers(result))
+    return {"report.html": render(page), "study.yaml": study, **resolution_figures(result)}
+
+
+def resolution_figures(result: Cestac) -> dict[str, str | bytes]:
+    """The study in every format, and the figure where a position is perturbed, by file name."""
     from runtime.exports import array_files, cestac_arrays, cestac_csv
     from runtime.report import plots
-    from runtime.report.html import Page, Section, render
-    from runtime.report.sections import resolution_section
 
-    settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
-    page = Page(title=title, verdict=verdict_sentence(result), sections=[resolution_section(result), settings])
-    files: dict[str, str | bytes] = {"report.html": render(page), "cestac.json": result.to_json(), "study.yaml": study}
-    files |= {"cestac.csv": cestac_csv(result), "cestac.tex": result.to_latex(), **array_files("cestac", cestac_arrays(result))}
+    files: dict[str, str | bytes] = {"cestac.json": result.to_json(), "cestac.csv": cestac_csv(result), "cestac.tex": result.to_latex()}
+    files |= array_files("cestac", cestac_arrays(result))
     if any(level.level.delta and not level.level.torque for level in result.levels):
         figure = plots.error_against_resolution(result)
         files |= {"resolution.png": plots.png(figure), "resolution.svg": plots.svg(figure)}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from symgen.cli.session import SIMULATED_WARNING, opened_model, reported_errors, single_thread, study_text
+from symgen.cli.session import opened_model, reported_errors, single_thread, study_text
 from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
@@ -113,20 +113,19 @@ def verdict(shown: Demonstration) -> str:
 def demo_files(shown: Demonstration, study: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
     from runtime.report import plots
-    from runtime.report.html import Page, Section, render
-    from runtime.report.sections import identification_sections
+    from runtime.report.html import render
     from symgen.cli.demo_sections import demo_sections
-    from symgen.cli.identify import identification_files, provenance_line
+    from symgen.cli.identify import identification_files
+    from symgen.cli.pages import identification_page
 
-    own, *others = identification_sections(shown.found)
-    settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
     kind = "SIMULATED record, nothing measured" if shown.simulated else "public measured record"
-    page = Page(
+    page = identification_page(
+        shown.found,
+        study,
         title=f"{shown.found.model.NAME}: identification and encoder resolution, {kind}",
         verdict=verdict(shown),
-        sections=[own, *demo_sections(shown), *others, settings],
-        warning=f"The measured record was not available. {SIMULATED_WARNING}" if shown.simulated else "",
-        footer=provenance_line(shown.found),
+        warning="The measured record was not available." if shown.simulated else "",
+        shown=demo_sections(shown),
     )
     curve = plots.error_against_resolution(shown.curve or shown.resolution, ("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5"))
     return {

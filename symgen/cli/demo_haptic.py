@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from symgen.cli.session import SIMULATED_WARNING, opened_model, origin, study_text
+from symgen.cli.session import opened_model, origin, study_text
 
 if TYPE_CHECKING:
     import numpy as np
@@ -146,20 +146,19 @@ def verdict(shown: HapticDemonstration) -> str:
 def demo_files(shown: HapticDemonstration, study: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
     from runtime.report import plots
-    from runtime.report.html import Page, Section, render
-    from runtime.report.sections import identification_sections
+    from runtime.report.html import render
     from runtime.report.workspace import workspace_figure
     from symgen.cli.haptic_sections import FACES, LABELS, MAIN, haptic_sections
-    from symgen.cli.identify import identification_files, provenance_line
+    from symgen.cli.identify import identification_files
+    from symgen.cli.pages import identification_page
 
-    own, *others = identification_sections(shown.found)
-    settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
-    page = Page(
+    page = identification_page(
+        shown.found,
+        study,
         title=f"{shown.found.model.NAME}: identification and encoder resolution, SIMULATED record, nothing measured",
         verdict=verdict(shown),
-        sections=[own, *haptic_sections(shown), *others, settings],
-        warning=f"No record of this interface is public. {SIMULATED_WARNING}",
-        footer=provenance_line(shown.found),
+        warning="No record of this interface is public.",
+        shown=haptic_sections(shown),
     )
     curve, maps = plots.error_against_resolution(shown.resolution, MAIN), workspace_figure(shown.felt, SHEET, FACES, LABELS)
     return {

@@ -10,7 +10,8 @@ import numpy as np
 from runtime.cestac_result import Cestac, LevelResult
 from runtime.estimate import Estimate
 from runtime.report.html import Section, Table
-from runtime.report.sections import number, resolution_section
+from runtime.report.markup import number
+from runtime.report.sections import resolution_section
 from symgen.cli import chapter_tables as chapter
 from symgen.cli.demonstration import Demonstration
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from runtime.cestac_result import NEGLIGIBLE, Cestac
 from runtime.report.html import Section, Table
-from runtime.report.sections import number, resolution_section
+from runtime.report.markup import number
+from runtime.report.sections import resolution_section
 from runtime.report.workspace import workspace_section
 from symgen.cli import haptic_record as record
 from symgen.cli import haptic_tables as chapter

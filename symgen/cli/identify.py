@@ -11,7 +11,6 @@ import typer
 from symgen.cli.beside import Beside, beside
 from symgen.cli.session import (
     NEGATIVE,
-    SIMULATED_WARNING,
     in_target,
     opened_model,
     origin,
@@ -134,21 +133,14 @@ def identification_files(found: Identification, study: str, more: Beside | None 
     """Contents of the output folder, by file name."""
     from runtime.exports import array_files, estimate_arrays
     from runtime.report import plots
-    from runtime.report.html import Page, Section, render
-    from runtime.report.sections import identification_sections, parameters_csv, torque_unit
+    from runtime.report.html import render
+    from runtime.report.sections import parameters_csv, torque_unit
+    from symgen.cli.pages import identification_page
 
     unit = torque_unit(found)
     overlay, residuals = plots.torque_overlay(found.comparison, unit, found.source), plots.residual_histogram(found.comparison, unit)
-    settings = Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
-    page = Page(
-        title=f"{found.model.NAME}: identification on {found.name}",
-        warning=SIMULATED_WARNING if found.source == "simulated" else "",
-        verdict=found.verdict,
-        sections=[*identification_sections(found), *([] if more is None else more.sections()), settings],
-        footer=provenance_line(found),
-    )
     return {
-        "report.html": render(page),
+        "report.html": render(identification_page(found, study, more)),
         "estimate.json": estimate_json(found, more),
         "parameters.csv": parameters_csv(found),
         "parameters.tex": found.carried.to_latex(blocks=1 if len(found.carried.names) <= ONE_BLOCK else 2),
@@ -159,11 +151,3 @@ def identification_files(found: Identification, study: str, more: Beside | None 
         "residuals.png": plots.png(residuals),
         **({} if more is None else more.files()),
     }
-
-
-def provenance_line(found: Identification) -> str:
-    """Hashes and versions that reproduce the result."""
-    provenance = found.every.provenance
-    files = ", ".join(f"{name} {digest[:12]}" for name, digest in provenance["files"].items())
-    versions = ", ".join(f"{name} {version}" for name, version in provenance["versions"].items())
-    return f"Robot {provenance['robot']}, SHA-256 {provenance['robot_sha256'][:12]}. Files (SHA-256): {files}. Versions: {versions}."

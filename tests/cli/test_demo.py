@@ -53,7 +53,7 @@ def test_offline_is_labelled_everywhere(offline):
     assert "measured, predicted by" not in html
     study = (out / "study.yaml").read_text()
     assert "SIMULATED" in study and simulated.FILE in study and (out / simulated.FILE).is_file()
-    assert "http://" not in html and "https://" not in html and "<script" not in html
+    assert "http://" not in html and "https://" not in html and html.count("<script") == 2
 
 
 def test_offline_recovers_what_was_put_in(offline):

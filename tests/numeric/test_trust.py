@@ -136,7 +136,7 @@ def test_sets_by_threshold_and_what_is_shown():
         and data["f_tests"][0]["name"] == found.trail[0].name
     )
     section = trust_section(checked)
-    assert [len(t.rows) for t in section.tables] == [len(found.names), 2, len(found.trail), len(found.counts)] and section.images
+    assert [len(t.rows) for t in section.tables] == [len(found.names), 2, len(found.trail), len(found.counts)]
 
 
 def test_a_record_that_determines_nothing_is_no_error():

@@ -1,38 +1,117 @@
-"""The report page: escaping, one self-contained file, tables that fit their header."""
+"""The report page: well-formed, escaping, one self-contained file whose policy names its one script; tables that fit their header."""
 
+import json
 import re
+from base64 import b64encode
+from hashlib import sha256
+from html import unescape
+from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
-from runtime.report.html import Image, Page, Section, Table, render
+from runtime.report.html import Image, Matrix, Number, Page, Section, Table, embedded, render
+from runtime.report.markup import element, formula, symbol
+from runtime.report.series import Series
 
-HOSTILE = '<script>alert("x")</script> & \'"><img src=x onerror=alert(1)>'
-
-
-def page():
-    table = Table(HOSTILE, (HOSTILE, "b"), [(HOSTILE, "1")], note=HOSTILE)
-    section = Section(HOSTILE, (HOSTILE,), [Image(HOSTILE, b"<svg/>", HOSTILE)], [table], HOSTILE)
-    return Page(HOSTILE, HOSTILE, [section], warning=HOSTILE, footer=HOSTILE)
+HOSTILE = "</style></script><script>alert('x')</script> & \"<img src=x onerror=alert(1)> {{ 7*7 }} <!-- ]]>"
+VOID = {"meta", "img"}
 
 
-def test_everything_is_escaped():
-    html = render(page())
-    assert "<script" not in html and "<img src=x" not in html
-    assert html.count("&lt;script&gt;") == 15  # every place of a page, the heading and its link apart
-    assert len(re.findall(r"<img ", html)) == 1
+class Strict(HTMLParser):
+    """Every start tag has its end tag, in order."""
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.open, self.tags, self.attributes = [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value) for name, value in attrs]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open and self.open.pop() == tag, f"</{tag}> in {self.open}"
+
+
+def page(text, *, live=True):
+    t = np.arange(3.0)
+    table = Table(
+        text, (text, "b"), [(text, element("details", element("summary", text), text))], text, kinds=(text,), only=text, sortable=live
+    )
+    image = Image(text, b"<svg/>", text, Series(t, t, t, (text, text), text, 3) if live else None)
+    section = Section(text, (text,), [image], [table], text, [Matrix(text, (text, symbol(text)), ((1.0, -0.5), (-0.5, 1.0)))])
+    return Page(text, text, [section], text, text, "no", text, text, [(text, text)], [Number(text, text, "doubtful")])
+
+
+def policy(html):
+    return unescape(re.search(r'Content-Security-Policy" content="([^"]*)"', html)[1])
+
+
+def test_hostile_texts_stay_text():
+    """In every place of a page: the same elements as with harmless texts."""
+    hostile, harmless = Strict(render(page(HOSTILE))), Strict(render(page("text")))
+    assert hostile.tags == harmless.tags and hostile.tags.count("script") == 2
+    assert [a[:2] for a in hostile.attributes] == [a[:2] for a in harmless.attributes]
+    assert "{{ 7*7 }}" in render(page(HOSTILE))
+    assert policy(render(page(HOSTILE))) == policy(render(page("text")))
 
 
 def test_nothing_is_fetched():
-    html = render(page())
-    assert "default-src 'none'" in html
-    addresses = re.findall(r'(?:src|href)="([^"]*)"', html)
+    html = render(page("text"))
+    addresses = re.findall(r'(?:src|href|action|srcset)="([^"]*)"', html)
     assert addresses and all(a.startswith(("data:image/svg+xml;base64,", "#")) for a in addresses)
+    assert not re.search(r"url\((?!#)|@import", html.replace("url(#clip$", ""))
+
+
+def test_policy_allows_this_script_and_this_style_alone():
+    html = render(page("text"))
+    script, style = re.search(r"<script>(.*?)</script>", html, re.DOTALL)[1], re.search(r"<style>(.*?)</style>", html, re.DOTALL)[1]
+    digests = [f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in (style, script)]
+    assert policy(html) == (
+        f"default-src 'none'; img-src data:; style-src {digests[0]}; script-src {digests[1]}; base-uri 'none'; form-action 'none'"
+    )
+
+
+def test_a_page_without_figures_to_zoom_has_no_script():
+    plain = Page("t", "v", [Section("s", images=[Image("c", b"<svg/>", "a")], tables=[Table("t", ("a",), [("1",)])])])
+    html = render(plain)
+    assert "<script" not in html and "script-src" not in policy(html)
 
 
 def test_same_page_same_bytes():
-    assert render(page()) == render(page())
+    assert render(page("text")) == render(page("text"))
+
+
+def test_embedded_values_do_not_end_the_script():
+    text = embedded({HOSTILE: [HOSTILE]})
+    assert not set("<>&") & set(text) and json.loads(text) == {HOSTILE: [HOSTILE]}
+    with pytest.raises(ValueError, match="JSON"):
+        embedded(float("nan"))
 
 
 def test_ragged_table_is_refused():
     with pytest.raises(ValueError, match="1 cells"):
         Table("t", ("a", "b"), [("1",)])
+    with pytest.raises(ValueError, match="2 kinds"):
+        Table("t", ("a",), [("1",)], kinds=("x", "y"))
+
+
+@pytest.mark.parametrize(("text", "expected"), [
+    ("ZZ1 + Ia1 - D3**2*(M3 + M4)", "ZZ1 + Ia1 − D32\u2009(M3 + M4)"),
+    ("-2*XX2*cos(A)", "−2\u2009XX2\u2009cos(A)"),
+])  # fmt: skip
+def test_formula_reads_as_the_text(text, expected):
+    html = formula(text)
+    Strict(html)
+    assert unescape(re.sub(r"<[^>]*>", "", html)) == expected
+    assert formula("D3**2") == '<span class="formula"><var>D<sub>3</sub></var><sup>2</sup></span>'
+
+
+def test_names_and_formulas_cannot_bring_in_markup():
+    for made in (symbol(HOSTILE), formula(HOSTILE)):
+        assert set(Strict(made).tags) <= {"var", "sub", "sup", "span"}

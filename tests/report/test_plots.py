@@ -29,6 +29,6 @@ def test_same_data_same_bytes(comparison):
 
 
 def test_lines_break_at_gaps(comparison):
-    (ax,) = plots.joint_overlay(comparison.joints[0]).axes
-    measured = ax.lines[0].get_ydata()
-    assert np.isnan(measured).sum() == 1 and np.isnan(measured[50])
+    upper, lower = plots.joint_overlay(comparison.joints[0]).axes
+    for y in (upper.lines[0].get_ydata(), upper.lines[1].get_ydata(), lower.lines[0].get_ydata()):
+        assert np.isnan(y).sum() == 1 and np.isnan(y[50])
