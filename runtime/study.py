@@ -72,6 +72,7 @@ class RecordSettings:
     torque_constant : N*m/A or N*m/V where the unit of tau is A or V; default: that of the robot's drives.
     coupling : use the off-diagonal part of R for "both", for "position" or "torque" alone, or for "none".
     jitter : largest deviation of the time column from a uniform grid, in sampling periods.
+    topic : of a bag, where it holds several of sensor_msgs/JointState.
     """
 
     files: tuple[str, ...] = ()
@@ -86,6 +87,7 @@ class RecordSettings:
     jitter: float = 0.1
     dataset: str | None = None
     name: str | None = None
+    topic: str | None = None
 
     def __post_init__(self) -> None:
         _require(len(self.files) <= 2, ("files",), f"{len(self.files)} files; expected one, or two (positions, then torques)")

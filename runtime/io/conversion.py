@@ -13,6 +13,7 @@ import numpy as np
 
 from runtime.drives import Drives
 from runtime.errors import InputError
+from runtime.io.joint_states import JointTable
 from runtime.io.table import Named, Table
 from runtime.study import Columns, RecordSettings
 
@@ -62,11 +63,20 @@ def conversion(settings: RecordSettings, drives: Drives | None, first: Table, la
 
 
 def column_names(settings: RecordSettings, first: Named, last: Named) -> Columns:
-    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out."""
+    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag: the joints of its messages."""
     given = settings.columns
     t = given.t if given.t is not None or settings.rate is not None or "t" not in first.names else "t"
     qr = given.qr or (_numbered("qr", first) if "qr1" in first.names else ())
-    return Columns(t, given.q or _numbered("q", first), given.tau or _numbered("tau", last), qr)
+    if isinstance(first, JointTable) and settings.units.t != "s":
+        raise InputError(f"record.units.t is {settings.units.t}; time stamps of bags are read in s", file=first.file)
+    of_q = _meant(first, "q", "position", given.q)
+    return Columns(t, of_q, _meant(last, "tau", "effort", given.tau or (given.q if isinstance(last, JointTable) else ())), qr)
+
+
+def _meant(table: Named, key: str, quantity: str, names: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(table, JointTable):
+        return table.columns(quantity, names)
+    return tuple(names) or _numbered(key, table)
 
 
 def reference_columns(table: Table, names: Sequence[str], n: int) -> Array | None:
@@ -80,7 +90,7 @@ def reference_columns(table: Table, names: Sequence[str], n: int) -> Array | Non
 
 
 def _numbered(quantity: str, table: Named) -> tuple[str, ...]:
-    found = sorted((int(m[1]), name) for name in table.names if (m := re.fullmatch(rf"{quantity}(\d+)", name)))
+    found = sorted((int(m[1]), name) for name in table.names if (m := re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name)))
     if not found:
         raise InputError(
             f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name them in record.columns.{quantity}",

@@ -31,7 +31,7 @@ def read_record(settings: RecordSettings, drives: Drives | None = None, *, folde
     drives : of the robot; needed where side is "motor".   folder : where relative file names start (default: the current folder).
     """
     paths = record_files(settings, folder)
-    tables = [read_table(path) for path in paths]
+    tables = [read_table(path, settings.topic) for path in paths]
     first, last = tables[0][0], tables[-1][0]
     names = column_names(settings, first, last)
     q, tau = finite_columns(first, names.q), finite_columns(last, names.tau)

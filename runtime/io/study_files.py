@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from runtime.errors import InputError, SettingsError
 from runtime.io.datasets import DATASETS, dataset_study
-from runtime.io.table import READERS
+from runtime.io.table import KINDS, is_measured
+from runtime.io.yaml_text import yaml_values
 from runtime.mapping import structure
 from runtime.study import RecordSettings, Study, study_from_mapping
 
 T = TypeVar("T")
-
-LONGEST = 1_000_000  # characters
-DEEPEST = 50  # levels; also stops an alias that contains itself
-LARGEST = 100_000  # values, aliases expanded
 
 
 def study_of(record: str) -> tuple[Study, Path]:
@@ -33,10 +27,10 @@ def study_of(record: str) -> tuple[Study, Path]:
         return study_from_mapping(dataset_study(record)), Path()
     if path.suffix.lower() in (".yaml", ".yml"):
         return load_study(path), path.parent
-    if any(suffix.lower() in READERS for suffix in path.suffixes):
+    if is_measured(path):
         return Study(record=(RecordSettings(files=(path.name,)),)), path.parent
     raise InputError(
-        f"no record {record!r}; expected a dataset ({', '.join(DATASETS)}), a study file (.yaml) or a measured file ({', '.join(READERS)})"
+        f"no record {record!r}; expected a dataset ({', '.join(DATASETS)}), a study file (.yaml) or a measured file ({', '.join(KINDS)}, the folder of a ROS 2 bag)"
     )
 
 
@@ -60,37 +54,11 @@ def study_from_text(text: str, *, file: str = "study") -> Study:
 
 def settings_from_text(kind: type[T], text: str, *, file: str) -> T:
     """The settings, a frozen dataclass, of a YAML text; raises SettingsError with file, line and key."""
-    if len(text) > LONGEST:
-        raise InputError(f"{len(text)} characters; such a file has at most {LONGEST}", file=file)
-    try:
-        tree = YAML(typ="rt", pure=True).load(text)
-    except MarkedYAMLError as e:
-        mark = e.problem_mark or e.context_mark
-        raise SettingsError(f"not YAML: {e.problem or e.context}", file=file, line=None if mark is None else mark.line + 1) from None
-    except (YAMLError, ValueError, RecursionError) as e:
-        raise SettingsError(f"not YAML: {str(e).splitlines()[0] if str(e) else type(e).__name__}", file=file) from None
-    values = _plain(tree, file, [0], 0)
+    values, tree = yaml_values(text, file=file)
     try:
         return structure(kind, {} if values is None else values)
     except SettingsError as e:
         raise SettingsError(e.reason, path=e.path, file=file, line=_line(tree, e.path)) from None
-
-
-def _plain(node: Any, file: str, count: list[int], depth: int) -> Any:
-    """Built-in dict, list, str, int, float, bool and None; keys as texts."""
-    count[0] += 1
-    if depth > DEEPEST or count[0] > LARGEST:
-        raise SettingsError(f"nested deeper than {DEEPEST} levels or more than {LARGEST} values", file=file)
-    if isinstance(node, Mapping):
-        return {str(k): _plain(v, file, count, depth + 1) for k, v in node.items()}
-    if isinstance(node, list):
-        return [_plain(v, file, count, depth + 1) for v in node]
-    if isinstance(node, bool) or node is None:
-        return node
-    for kind in (int, float, str):
-        if isinstance(node, kind):
-            return kind(node)
-    raise SettingsError(f"{type(node).__name__} value {str(node)[:40]!r}; expected numbers, texts, lists and mappings", file=file)
 
 
 def _line(node: Any, path: tuple[str | int, ...]) -> int | None:

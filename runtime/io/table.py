@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from runtime.errors import InputError
+from runtime.io.bags import read_bag
 from runtime.io.files import read_bytes, sha256
 from runtime.io.mat import read_mat
 from runtime.io.npz import npy_blocks, npz_blocks, read_npy, read_npz
@@ -53,6 +54,8 @@ READERS: Mapping[str, Callable[[bytes, str], Table]] = {
     ".parquet": read_parquet,
     ".mat": read_mat,
 }
+BAGS = (".bag", ".mcap", ".db3")
+KINDS = (*READERS, *BAGS)
 
 
 class BlockTable(Named, Protocol):
@@ -77,8 +80,9 @@ def open_table(path: Path) -> BlockTable:
     """A file to be read by blocks; InputError for formats that are read whole only."""
     kind = _kind(path)
     if kind not in BLOCK_READERS:
+        what = "bags" if kind in BAGS else f"{kind} files"
         raise InputError(
-            f"{kind} files are read whole; convert to {', '.join(BLOCK_READERS)} to read by blocks, or set stream: off", file=str(path)
+            f"{what} are read whole; convert to {', '.join(BLOCK_READERS)} to read by blocks, or set stream: off", file=str(path)
         )
     if path.suffix.lower() == ".gz" and BLOCK_READERS[kind] is not text_blocks:
         raise InputError(f"a {kind} file within .gz cannot be read by blocks; uncompress it, or set stream: off", file=str(path))
@@ -87,17 +91,35 @@ def open_table(path: Path) -> BlockTable:
     return BLOCK_READERS[kind](path, path.name)
 
 
-def read_table(path: Path) -> tuple[Table, str]:
-    """Table of a .csv, .txt, .dat, .tsv, .npy, .npz, .parquet or .mat file, perhaps ending in .gz, and the SHA-256 of its uncompressed bytes."""
+def read_table(path: Path, topic: str | None = None) -> tuple[Table, str]:
+    """Table of a measured file, and the SHA-256 of its uncompressed bytes.
+
+    path : .csv, .txt, .dat, .tsv, .npy, .npz, .parquet or .mat, perhaps ending in .gz; .bag, .mcap, .db3 or the folder of a ROS 2 bag.
+    topic : of a bag; default: the only one that holds sensor_msgs/JointState.
+    """
     kind = _kind(path)
-    data = read_bytes(path)
-    return READERS[kind](data, path.name), sha256(data)
+    if kind not in BAGS:
+        data = read_bytes(path)
+        return READERS[kind](data, path.name), sha256(data)
+    if path.suffix.lower() == ".gz":
+        raise InputError("a bag within .gz; uncompress it", file=str(path))
+    if not path.exists():
+        raise InputError("cannot be read: no such file", file=str(path))
+    return read_bag(path, topic)
+
+
+def is_measured(path: Path) -> bool:
+    """Whether the name is that of a measured file, or of a folder, which may be a ROS 2 bag."""
+    return path.is_dir() or any(suffix.lower() in KINDS for suffix in path.suffixes)
 
 
 def _kind(path: Path) -> str:
-    """The ending of a file that tells its format."""
-    suffixes = [s.lower() for s in path.suffixes if s.lower() != ".gz"]
+    """The ending of a file that tells its format; a folder is a bag."""
+    suffixes = [".db3"] if path.is_dir() else [s.lower() for s in path.suffixes if s.lower() != ".gz"]
     kind = suffixes[-1] if suffixes else ""
-    if kind not in READERS:
-        raise InputError(f"unknown kind of file {kind!r}; expected {', '.join(READERS)}, plain or with .gz", file=str(path))
+    if kind not in KINDS:
+        raise InputError(
+            f"unknown kind of file {kind!r}; expected {', '.join(READERS)}, plain or with .gz, {', '.join(BAGS)} or the folder of a ROS 2 bag",
+            file=str(path),
+        )
     return kind

@@ -1,0 +1,266 @@
+"""Record files made to do harm: bombs, names that lead elsewhere, tables that compute, bytes that are none of the format. All are refused by name."""
+
+import gzip
+import io
+import re
+import shutil
+import sqlite3
+import struct
+import tracemalloc
+import zipfile
+
+import numpy as np
+import pytest
+from bag_files import KINDS, joint_states, write_bag
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rosbags.typesys import get_types_from_msg
+
+from runtime import read_record, study_from_mapping
+from runtime.errors import InputError
+from runtime.io.bags import read_bag
+
+ALWAYS = 2**24  # bytes that any file may unpack to, here
+BEYOND = ALWAYS + 2**20
+N = 30
+STAMPS = np.arange(1, N + 1) * 5_000_000
+MESSAGES = {"/joint_states": joint_states(STAMPS, ("j1", "j2"), np.zeros((N, 2)), np.ones((N, 2)))}
+
+
+@pytest.fixture(autouse=True)
+def smaller(monkeypatch):
+    """The limit of 256 MiB takes seconds to reach."""
+    monkeypatch.setattr("runtime.io.limits.ALWAYS", ALWAYS)
+
+
+def refused(read, said, peak=60e6):
+    """`read` raises an InputError that says so and never holds `peak` bytes."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=said):
+            read()
+        assert tracemalloc.get_traced_memory()[1] < peak
+    finally:
+        tracemalloc.stop()
+
+
+def record(path):
+    return read_record(study_from_mapping({"record": {"files": str(path)}}).record[0])
+
+
+# --- bombs ------------------------------------------------------------------------------------------------------------
+
+
+def test_gzip_bomb(tmp_path):
+    with gzip.open(tmp_path / "a.csv.gz", "wb", compresslevel=9) as packed:
+        for _ in range(BEYOND // 2**20):
+            packed.write(b"1\n" * 2**19)
+    refused(lambda: record(tmp_path / "a.csv.gz"), "unpacks to 16 MiB or more")
+
+
+def test_zip_bomb_in_npz(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as packed, packed.open("q1.npy", "w", force_zip64=True) as member:
+        np.lib.format.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": (BEYOND // 8,)})
+        for _ in range(BEYOND // 2**20):
+            member.write(bytes(2**20))
+    refused(lambda: record(tmp_path / "a.npz"), "unpacks to 17 MiB or more")
+
+
+def test_npz_that_declares_more_than_it_holds(tmp_path):
+    content = io.BytesIO()
+    np.lib.format.write_array_header_1_0(content, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)})
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as packed:
+        packed.writestr("q1.npy", content.getvalue())
+    with pytest.raises(InputError, match="not an archive of plain arrays"):
+        record(tmp_path / "a.npz")
+
+
+def mcap_with(chunk, compression, size, tail=b""):
+    """An unindexed MCAP file of one chunk that says it unpacks to `size` bytes."""
+    name = compression.encode()
+    content = struct.pack("<QQQII", 0, 0, size, 0, len(name)) + name + struct.pack("<Q", len(chunk)) + chunk
+    header = struct.pack("<I", 4) + b"ros2" + struct.pack("<I", 0)
+    footer = struct.pack("<QQI", 0, 0, 0)
+    records = ((1, header), (6, content), (2, footer))
+    magic = b"\x89MCAP0\r\n"
+    return magic + b"".join(struct.pack("<BQ", kind, len(body)) + body for kind, body in records) + tail + magic
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+@pytest.mark.parametrize(("said", "message"), [(BEYOND, "unpacks to 17 MiB or more"), (1000, "does not unpack to the 1000 bytes it says")])
+def test_mcap_chunk_bomb(tmp_path, compression, said, message):
+    """Whether the chunk tells its size or lies."""
+    import lz4.frame
+    from backports import zstd
+
+    packed = {"zstd": zstd.compress, "lz4": lz4.frame.compress}[compression](bytes(BEYOND))
+    (tmp_path / "a.mcap").write_bytes(mcap_with(packed, compression, said))
+    refused(lambda: read_bag(tmp_path / "a.mcap"), message, peak=10e6)
+
+
+def test_mcap_index_that_leads_elsewhere(tmp_path):
+    """Chunks that are no record of the file, such as bytes within an attachment, would never have been measured."""
+    path = write_bag("bare mcap", tmp_path / "run", MESSAGES)
+    data = bytearray(path.read_bytes())
+    (summary,) = struct.unpack_from("<Q", data, len(data) - 28)
+    place = summary
+    while data[place] != 0x08:
+        place += 9 + struct.unpack_from("<Q", data, place + 1)[0]
+    struct.pack_into("<Q", data, place + 9 + 16, 100)
+    path.write_bytes(data)
+    refused(lambda: read_bag(path), "index that does not lead to the chunks")
+
+
+@pytest.mark.parametrize("kind", ["bz2", "lz4"])
+def test_ros1_chunk_bomb(tmp_path, kind, monkeypatch):
+    """A chunk that unpacks to what its messages do not need."""
+    import bz2
+
+    import lz4.frame
+
+    path = write_bag(f"ros1 {kind}", tmp_path / "run", MESSAGES)
+    data = path.read_bytes()
+    packed = {"bz2": bz2.compress, "lz4": lz4.frame.compress}[kind](bytes(BEYOND))
+    start = data.index(b"compression=") + len(b"compression=" + kind.encode())
+    start += len(b"\x08\x00\x00\x00size=....") if data[start + 4 : start + 8] == b"size" else 0
+    (length,) = struct.unpack_from("<I", data, start)
+    path.write_bytes(data[:start] + struct.pack("<I", len(packed)) + packed + data[start + 4 + length :])
+    shift = len(packed) - length
+    data = bytearray(path.read_bytes())
+    place = data.index(b"index_pos=") + len(b"index_pos=")
+    struct.pack_into("<Q", data, place, struct.unpack_from("<Q", data, place)[0] + shift)
+    path.write_bytes(data)
+    refused(lambda: read_bag(path), "unpacks to 16 MiB or more", peak=2.5 * ALWAYS)
+
+
+@pytest.mark.parametrize("kind", ["sqlite3 message", "sqlite3 file"])
+def test_zstd_bomb_in_a_ros2_bag(tmp_path, kind):
+    from backports import zstd
+
+    path = write_bag(kind, tmp_path / "run", MESSAGES)
+    packed = zstd.compress(bytes(BEYOND))
+    if kind.endswith("file"):
+        next(path.glob("*.zstd")).write_bytes(packed)
+    else:
+        with sqlite3.connect(next(path.glob("*.db3"))) as bag:
+            bag.execute("UPDATE messages SET data = ?", (packed,))
+        bag.close()
+    refused(lambda: read_bag(path), "unpacks to", peak=2.5 * ALWAYS)
+
+
+# --- tables that compute, definitions that a bag brings along -----------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        "ALTER TABLE messages RENAME TO m; CREATE VIEW messages AS SELECT id, topic_id, timestamp, zeroblob(1000000000) AS data FROM m;",
+        "DROP TABLE messages; CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
+        "data BLOB GENERATED ALWAYS AS (zeroblob(1000000000)));",
+        "DROP TABLE message_definitions; CREATE VIEW Message_Definitions AS SELECT 1 AS id;",
+    ],
+)
+def test_sqlite_tables_that_compute(tmp_path, script):
+    path = write_bag("bare db3", tmp_path / "run", MESSAGES)
+    bag = sqlite3.connect(path)
+    bag.executescript(script)
+    bag.close()
+    refused(lambda: read_bag(path), "is not a table of stored values")
+
+
+def test_a_definition_of_its_own_is_refused(tmp_path):
+    """And never becomes code."""
+    path = write_bag("bare mcap", tmp_path / "run", MESSAGES)
+    data = path.read_bytes()
+    assert get_types_from_msg("float64[] velocity", "a/msg/b")  # what would become code
+    path.write_bytes(data.replace(b"float64[] velocity", b"float32[] velocity"))
+    refused(lambda: read_bag(path), "defined otherwise")
+
+
+# --- names that lead elsewhere ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name", ["../secret.db3", "/etc/passwd", "run/../../secret.db3", "..", ".", "", "a\\..\\b", "run_0.db3?mode=rwc", ".hidden"]
+)
+def test_files_of_a_bag_stay_in_its_folder(tmp_path, name):
+    path = write_bag("sqlite3", tmp_path / "run", MESSAGES)
+    shutil.copy(next(path.glob("*.db3")), tmp_path / "secret.db3")
+    text = (path / "metadata.yaml").read_text()
+    (path / "metadata.yaml").write_text(re.sub(r"(relative_file_paths:\s*\n\s*- ).*", lambda m: m[1] + repr(name), text))
+    refused(lambda: read_bag(path), "expected a file of this folder")
+
+
+def test_links_out_of_the_folder(tmp_path):
+    path = write_bag("sqlite3", tmp_path / "run", MESSAGES)
+    store = next(path.glob("*.db3"))
+    store.rename(tmp_path / "secret.db3")
+    store.symlink_to(tmp_path / "secret.db3")
+    refused(lambda: read_bag(path), "expected a file of this folder")
+
+
+LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{b}: &{b} [{', '.join(['*' + a] * 9)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (LAUGHS, "more than 100000 values"),
+        ("[" * 500_000, "nested deeper"),
+        ("[a, " * 199, "not YAML"),
+        ("- " * 2000, "not YAML"),
+        ("x: " + "1" * 2_000_000, "at most 1000000"),
+        ("!!python/object/apply:os.system [true]", "expected"),
+        ("rosbag2_bagfile_information: 1", "no mapping rosbag2_bagfile_information"),
+        ("rosbag2_bagfile_information: {relative_file_paths: 5}", "names no file"),
+        ("rosbag2_bagfile_information: {relative_file_paths: [x], compression_mode: file, compression_format: rar}", "compression 'rar'"),
+        ("\x00", "not YAML"),
+    ],
+)
+def test_descriptions_of_bags(tmp_path, text, said):
+    path = write_bag("sqlite3", tmp_path / "run", MESSAGES)
+    (path / "metadata.yaml").write_text(text)
+    refused(lambda: read_bag(path), said)
+
+
+# --- damaged files ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Bytes of one file of every kind that is a single file."""
+    folder = tmp_path_factory.mktemp("bags")
+    paths = [write_bag(kind, folder / kind.replace(" ", "_"), MESSAGES) for kind in KINDS]
+    paths = [
+        path if path.is_file() else next(p for p in path.iterdir() if p.suffix in (".db3", ".mcap"))
+        for path in paths
+        if "file" not in path.name
+    ]
+    return [(path.suffix, path.read_bytes()) for path in paths]
+
+
+def test_truncated_bags(tmp_path, whole):
+    for suffix, data in whole:
+        for share in (0, 0.01, 0.3, 0.7, 0.99):
+            path = tmp_path / f"a{suffix}"
+            path.write_bytes(data[: int(share * len(data))])
+            with pytest.raises(InputError, match=path.name):
+                read_bag(path)
+
+
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_spoiled_bags(tmp_path, whole, data):
+    """8 bytes anywhere: numbers or an InputError, nothing else."""
+    for suffix, content in whole:
+        spoiled = bytearray(content)
+        place = data.draw(st.integers(0, len(spoiled) - 8))
+        spoiled[place : place + 8] = data.draw(st.binary(min_size=8, max_size=8))
+        path = tmp_path / f"a{suffix}"
+        path.write_bytes(spoiled)
+        try:
+            read_bag(path)[0].stack(["t", "j1.position"])
+        except InputError as e:
+            assert path.name in str(e) or "/joint_states" in str(e)
