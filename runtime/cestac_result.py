@@ -30,6 +30,7 @@ from scipy.special import stdtrit
 
 from runtime.estimate import Estimate, aligned, json_text
 from runtime.latex import error_table, level_table
+from runtime.notebook import cestac_html
 from runtime.observation import Observation
 from runtime.runs import Runs
 
@@ -153,6 +154,12 @@ class Cestac:
             mark = "" if name in self.deciding else " *"
             lines.append((name + mark, *(f"{r.e[i]:.2f} ({r.relative_sigma[i]:.2f})" for r in self.levels)))
         return aligned(lines)
+
+    def _repr_html_(self) -> str:
+        return cestac_html(self)
+
+    def _repr_latex_(self) -> str:
+        return self.to_latex()
 
     def to_latex(self) -> str:
         """LaTeX (booktabs): the mean values as the chapter's Tables 3 and 4, then %e as its Table 7, each a tabular."""

@@ -25,6 +25,7 @@ import numpy as np
 from runtime.documents import document, read_document
 from runtime.errors import InputError
 from runtime.latex import parameter_table
+from runtime.notebook import estimate_html
 
 Array = np.ndarray
 
@@ -119,6 +120,12 @@ class Estimate:
 
     def __str__(self) -> str:
         return self.to_table()
+
+    def _repr_html_(self) -> str:
+        return estimate_html(self)
+
+    def _repr_latex_(self) -> str:
+        return self.to_latex()
 
     def to_json(self) -> str:
         """JSON text of every field (design: estimate.json); numbers that do not exist are null."""

@@ -158,7 +158,7 @@ def recursive_formulas(regrouping: Regrouping) -> list[tuple[str, str]]:
 
 def latex_text(regrouping: Regrouping, only: str | None) -> str:
     r"""The formulas in an `aligned` environment with subscripts, ZZ_{1R} &= ZZ_{1} + I_{a1} + ..."""
-    from symgen.cli.latex import latex_formula, latex_name
+    from symgen.report.latex import latex_formula, latex_name
 
     rows = [f"{latex_name(b.name)} &= {latex_formula(b.combination)} \\\\" for b in chosen(regrouping, only) if only or b.name != b.own]
     return "\n".join(["\\begin{aligned}", *rows, "\\end{aligned}"])

@@ -61,6 +61,16 @@ class Regrouping:
     def __len__(self) -> int:
         return len(self.base)
 
+    def _repr_html_(self) -> str:
+        from symgen.report.notebook import regrouping_html  # text of a page: loaded where a notebook asks for it
+
+        return regrouping_html(self)
+
+    def _repr_latex_(self) -> str:
+        from symgen.report.notebook import regrouping_latex
+
+        return regrouping_latex(self)
+
 
 def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     """Derive the base parameters of `robot`. `seed` changes the random draws, never the result."""
