@@ -30,6 +30,7 @@ from symgen.regroup.solve import Recognition, Supports, Variable, states_for
 
 DIGITS = 60
 TOLERANCE = mpmath.mpf(10) ** -30
+ROUNDING = mpmath.mpf(10) ** -20  # of the largest entry: a column below it is zero, since right angles are not exact in 60 digits
 Matrix = list[list[Any]]
 
 
@@ -122,10 +123,11 @@ def echelon(rows: Matrix) -> tuple[list[int], Matrix]:
     M = [list(row) for row in rows]
     width = len(M[0])
     size = [max(abs(row[c]) for row in M) for c in range(width)]
+    least = ROUNDING * max(size)
     pivots: list[int] = []
     for c in range(width):
         rank = len(pivots)
-        if rank == len(M) or not size[c]:
+        if rank == len(M) or size[c] <= least:
             continue
         best = max(range(rank, len(M)), key=lambda r: abs(M[r][c]))
         if abs(M[best][c]) < TOLERANCE * size[c]:
@@ -278,10 +280,11 @@ def identities(
         algebra = PreciseAlgebra(robot, geometry, {})
         wrong = []
         tolerance = TOLERANCE if exact else mpmath.mpf(10) ** -9
+        least = ROUNDING * max(abs(x) for row in W for x in row)
         for name in names:
             terms = [(column[o], mpmath.mpf(algebra.constant(c))) for o, c in K.get(name, {}).items()]
             size = max(
-                max(abs(row[column[name]]) for row in W), max((abs(c * row[o]) for row in W for o, c in terms), default=mpmath.mpf(0))
+                max(abs(row[column[name]]) for row in W), max((abs(c * row[o]) for row in W for o, c in terms), default=least), least
             )
             if any(abs(row[column[name]] - sum(c * row[o] for o, c in terms)) > tolerance * size for row in W):
                 wrong.append(name)

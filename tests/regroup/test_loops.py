@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from symgen.derive.loops import close
-from symgen.description import Robot, load_robot
+from symgen.description import Robot, load_robot, parse_robot
 from symgen.description.expression import ONE
 from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, Element, Frame
@@ -164,6 +164,30 @@ def test_four_bar() -> None:
     wrong = BaseParameter("MX2R", "MX2", {**found.base[k].combination, "MX3": -found.base[k].combination["MX3"]})
     assert certify(found).valid
     assert not certify(replace(found, base=(*found.base[:k], wrong, *found.base[k + 1 :]))).valid
+
+
+ON_A_TURRET = """\
+symgen: 1
+name: turret
+gravity: [0, 0, -g]
+constants: {L1: 0.2, L2: 0.5, L3: 0.4, L4: 0.45, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: pi/2, d: 0, theta: q2, r: 0}
+  3: {ant: 2, sigma: 0, mu: 0, alpha: 0, d: L1, theta: q3, r: 0}
+  4: {ant: 1, sigma: 0, mu: 0, alpha: pi/2, d: L4, theta: q4, r: 0}
+  5: {ant: 3, sigma: 0, mu: 0, alpha: 0, d: L2, theta: q5, r: 0}
+  6: {ant: 4, sigma: 2, alpha: 0, d: L3, theta: 0, r: 0}
+loops: [{cut: 5, twin: 6, start: {q2: 1, q3: -0.5518, q4: 1.2956, q5: 0.8475}}]
+massless: [3, 4]
+"""
+
+
+def test_column_that_rounding_alone_fills_is_zero() -> None:
+    """A right angle is not exact in 60 digits: MZ2 has no effect, and its column is 1e-60."""
+    found = regroup(parse_robot(ON_A_TURRET.encode(), "turret.yaml"))
+    assert "MZ2" in found.no_effect
+    assert certify(found).valid
 
 
 def test_five_bar() -> None:
