@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from io import BytesIO
@@ -22,6 +21,8 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError
+from runtime.io.files import read_bytes
+from runtime.io.npz import archive_of
 from runtime.runs import Runs
 
 EVERY = 30.0  # s between two archives
@@ -130,10 +131,11 @@ def _json(path: Path) -> Mapping[str, Any]:
 def _read(path: Path, b: int) -> Runs:
     """The runs of one archive; pickled objects are refused."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            runs = Runs(**{name: archive[name] for name in Runs.__dataclass_fields__})
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as e:
-        raise InputError(f"damaged ({e}); delete this file, its runs are computed again", file=str(path)) from e
+        archive = archive_of(read_bytes(path), path.name)
+        runs = Runs(**{name: archive[name] for name in Runs.__dataclass_fields__})
+    except (InputError, KeyError) as e:
+        reason = e.message if isinstance(e, InputError) else f"no array {e}"
+        raise InputError(f"damaged ({reason}); delete this file, its runs are computed again", file=str(path)) from e
     R = len(runs)
     shapes = {name: (getattr(runs, name).shape, getattr(runs, name).dtype.kind) for name in Runs.__dataclass_fields__}
     wanted = {"level": ((R,), "i"), "run": ((R,), "i"), "X": ((R, b), "f"), "residual_norm": ((R,), "f"), "normal": ((R,), "b")}

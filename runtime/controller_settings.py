@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from runtime.errors import SettingsError
+from runtime.trajectories import motion_from_mapping
 
 Number = float | tuple[float, ...]  # one for all joints, or one per joint
 
@@ -115,6 +116,11 @@ class ReferenceSettings:
         given = [k for k in ("file", "record", "motion", "points") if getattr(self, k) is not None]
         if len(given) > 1:
             raise SettingsError(f"{' and '.join(given)}; expected one of file, record, motion, points", path=(given[1],))
+        if self.motion is not None:
+            try:
+                motion_from_mapping(self.motion)
+            except SettingsError as e:
+                raise SettingsError(e.reason, path=("motion", *e.path)) from None
 
 
 @dataclass(frozen=True)

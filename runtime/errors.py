@@ -6,6 +6,23 @@ they are a status of the Estimate.
 
 from __future__ import annotations
 
+LONGEST = 2000  # characters of a message: a file may hold names of any length
+
+
+def printable(text: str) -> str:
+    """`text` as a terminal may show it: what controls one (escape sequences, changes of direction) spelled out, the middle of a long one left out."""
+    for _ in range(2):  # spelled out, a text may be too long again
+        if len(text) > LONGEST:
+            text = f"{text[: LONGEST - 400]} ... {text[-300:]}"
+        if not text.isprintable():
+            text = "".join(c if c.isprintable() or c == "\n" else f"\\x{ord(c):02x}" for c in text)
+    return text
+
+
+def first_line(error: BaseException) -> str:
+    """What another library said of a file, in one line."""
+    return str(error).partition("\n")[0] or type(error).__name__
+
 
 class InputError(ValueError):
     """Data or settings that cannot be used.
@@ -19,7 +36,7 @@ class InputError(ValueError):
     def __init__(self, message: str, *, file: str | None = None, column: str | None = None, row: str | None = None) -> None:
         self.message, self.file, self.column, self.row = message, file, column, row
         place = ", ".join(part for part in (file, None if column is None else f"column {column!r}", row) if part)
-        super().__init__(f"{place}: {message}" if place else message)
+        super().__init__(printable(f"{place}: {message}" if place else message))
 
 
 class SettingsError(InputError):

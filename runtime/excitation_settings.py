@@ -76,7 +76,7 @@ class ExcitationSettings:
     @property
     def families(self) -> tuple[Family, ...]:
         """The parts, made."""
-        return tuple(family_from_mapping(part) for part in self.parts)
+        return tuple(family_from_mapping(part, ("parts", k)) for k, part in enumerate(self.parts))
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:

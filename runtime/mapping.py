@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import types
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from runtime.arithmetic import number
-from runtime.errors import SettingsError
+from runtime.errors import InputError, SettingsError
 
 T = TypeVar("T")
 Path = tuple[str | int, ...]
@@ -27,12 +27,17 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
         raise SettingsError(
             f"unknown key{'s' if len(unknown) > 1 else ''} {', '.join(unknown)}; known: {', '.join(_names(cls))}", path=(*path, unknown[0])
         )
+    needed = [f.name for f in fields(cls) if f.default is MISSING and f.default_factory is MISSING]  # type: ignore[arg-type]
+    if missing := [name for name in needed if name not in value]:
+        raise SettingsError(f"no key {', '.join(missing)}; add it", path=path)
     hints = get_type_hints(cls)
     arguments = {k: _convert(hints[k], v, (*path, k)) for k, v in value.items()}
     try:
         return cls(**arguments)
     except SettingsError as e:
         raise SettingsError(e.reason, path=(*path, *e.path)) from None
+    except InputError as e:
+        raise SettingsError(e.message, path=path) from None
 
 
 def plain(value: Any) -> Any:

@@ -117,14 +117,17 @@ def _check_names(model: GeneratedModel, label: str) -> None:
 
 
 def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
-    """One sample at rest through `store` and `observation_matrix`."""
+    """Two samples at rest through `store` and `observation_matrix`."""
     N = 2
     rest = np.zeros((N, n))
-    shape = np.shape(model.store(N))
+    try:
+        shape = np.shape(model.store(N))
+        with np.errstate(all="ignore"):
+            shapes = np.shape(model.regressor(rest, rest, rest)), np.shape(model.observation_matrix(rest, rest, rest))
+    except Exception as e:  # whatever a broken file raises becomes one kind of error
+        raise ModelError(f"fails on two samples at rest with {type(e).__name__}: {e}; emit it again", file=label) from e
     if shape != (b, n, N):
         raise ModelError(f"store({N}) has shape {shape}; expected {(b, n, N)}", file=label)
-    with np.errstate(all="ignore"):
-        shapes = np.shape(model.regressor(rest, rest, rest)), np.shape(model.observation_matrix(rest, rest, rest))
     if shapes != ((N, n, b), (n * N, b)):
         raise ModelError(f"regressor {shapes[0]}, observation_matrix {shapes[1]}; expected {(N, n, b)} and {(n * N, b)}", file=label)
 

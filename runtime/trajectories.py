@@ -22,6 +22,8 @@ import numpy as np
 from runtime.errors import InputError, SettingsError
 from runtime.mapping import structure
 
+MOST = 1000  # harmonics, terms or points of one part: far more than a motion of a robot has, few enough for any memory
+
 Array = np.ndarray
 States = tuple[Any, Any, Any]  # q, qd, qdd
 
@@ -266,25 +268,38 @@ class Motion:
 
 
 def motion_from_mapping(mapping: Mapping[str, Any]) -> Motion:
-    """Inverse of Motion.to_mapping; raises InputError that names the part."""
+    """Inverse of Motion.to_mapping; raises SettingsError with the path of what is wrong."""
     parts = mapping.get("parts")
     if not isinstance(parts, Sequence) or isinstance(parts, str):
-        raise InputError("no `parts` in this trajectory; expected a list of families with their coefficients `p`")
+        raise SettingsError("no `parts` in this trajectory; expected a list of families with their coefficients `p`")
     found = []
     for number, part in enumerate(parts, start=1):
         if not isinstance(part, Mapping) or "p" not in part:
-            raise InputError(f"part {number} of the trajectory has no coefficients `p`")
-        found.append(Part(family_from_mapping({k: v for k, v in part.items() if k != "p"}), np.array(part["p"], dtype=float).T))
+            raise SettingsError(f"part {number} of the trajectory has no coefficients `p`", path=("parts", number - 1))
+        try:
+            found.append(Part(family_from_mapping({k: v for k, v in part.items() if k != "p"}), _coefficients(part["p"]).T))
+        except SettingsError as e:
+            raise SettingsError(e.reason, path=("parts", number - 1, *e.path)) from None
+        except InputError as e:
+            raise SettingsError(e.message, path=("parts", number - 1, "p")) from None
     return Motion(tuple(found))
 
 
-def family_from_mapping(mapping: Mapping[str, Any]) -> Family:
-    """A family from {"family": "fourier", "period": 10 ...}; settings that are left out have their defaults."""
+def _coefficients(p: Any) -> Array:
+    """Numbers, shape (joints, P)."""
+    try:
+        return np.array(p, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError("no table of numbers; expected one list of coefficients for each joint") from None
+
+
+def family_from_mapping(mapping: Mapping[str, Any], path: tuple[str | int, ...] = ()) -> Family:
+    """A family from {"family": "fourier", "period": 10 ...}; settings that are left out have their defaults. path : of the mapping in its file."""
     settings = dict(mapping)
     kind = FAMILIES.get(str(settings.pop("family", None)))
     if kind is None:
-        raise SettingsError(f"no family {mapping.get('family')!r} of trajectories; there are {', '.join(FAMILIES)}", path=("family",))
-    family: Family = structure(kind, settings)
+        raise SettingsError(f"no family {mapping.get('family')!r} of trajectories; there are {', '.join(FAMILIES)}", path=(*path, "family"))
+    family: Family = structure(kind, settings, path)
     return family
 
 
@@ -343,3 +358,5 @@ def _positive(family: str, **values: float) -> None:
     for name, value in values.items():
         if not (np.isfinite(value) and value > 0):
             raise SettingsError(f"{family}: {value}; expected more than 0", path=(name,))
+        if isinstance(value, int) and value > MOST:
+            raise SettingsError(f"{family}: {value}; at most {MOST} in one part", path=(name,))

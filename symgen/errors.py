@@ -5,9 +5,24 @@ A message says what was given, what was expected, where, and what to do; the off
 
 from __future__ import annotations
 
+LONGEST = 2000  # characters of a message: a file may hold names of any length
+
 
 class SymgenError(Exception):
     """Root of all errors raised on bad input or on a derivation that cannot be completed."""
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(printable(message))
+
+
+def printable(text: str) -> str:
+    """`text` as a terminal may show it: what controls one (escape sequences, changes of direction) spelled out, the middle of a long one left out."""
+    for _ in range(2):  # spelled out, a text may be too long again
+        if len(text) > LONGEST:
+            text = f"{text[: LONGEST - 400]} ... {text[-300:]}"
+        if not text.isprintable():
+            text = "".join(c if c.isprintable() or c == "\n" else f"\\x{ord(c):02x}" for c in text)
+    return text
 
 
 class DescriptionError(SymgenError):

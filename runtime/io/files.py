@@ -9,14 +9,31 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from stat import S_ISDIR, S_ISREG
 from typing import BinaryIO, cast
 
 from runtime.errors import InputError
 from runtime.io.limits import allowed, require_size
 
+WHOLE = 2**31  # bytes of a file that is read into memory; larger ones are read by blocks
+
+
+def require_file(path: Path) -> int:
+    """Bytes of a file on disk; InputError for folders, and for pipes and devices, which may never answer or never end."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as e:
+        raise InputError(f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)) from e
+    if not S_ISREG(found.st_mode):
+        what = "a folder" if S_ISDIR(found.st_mode) else "a pipe or a device"
+        raise InputError(f"cannot be read: {what}; expected a file, copy its content into one", file=str(path))
+    return found.st_size
+
 
 def read_bytes(path: Path) -> bytes:
     """The uncompressed bytes of a file, recognised by its first two bytes, not by its name."""
+    if require_file(path) > WHOLE:
+        raise InputError(f"more than {WHOLE // 2**30} GiB; read it by blocks (stream: 65536 in the study file, or --block)", file=str(path))
     try:
         data = path.read_bytes()
     except OSError as e:
@@ -37,6 +54,7 @@ def read_bytes(path: Path) -> bytes:
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
     """The uncompressed bytes of a file as a stream; what goes wrong while it is read names the file."""
+    require_file(path)
     try:
         with path.open("rb") as plain:
             if plain.peek(2)[:2] != b"\x1f\x8b":

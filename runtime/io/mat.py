@@ -16,7 +16,7 @@ import numpy as np
 import scipy.io
 from scipy.io.matlab import MatReadError
 
-from runtime.errors import InputError
+from runtime.errors import InputError, first_line
 from runtime.io.arrays import ArrayTable, numeric
 from runtime.io.limits import allowed, inflated, require_size
 
@@ -26,7 +26,7 @@ COMPRESSED = 15  # type of an element that holds a zlib stream
 HDF5 = b"\x89HDF\r\n\x1a\n"
 DAMAGED = (
     *(MatReadError, OSError, EOFError, zlib.error, struct.error, MemoryError, RuntimeError),
-    *(ValueError, TypeError, KeyError, IndexError, AttributeError, AssertionError, ArithmeticError),
+    *(ValueError, TypeError, KeyError, IndexError, AttributeError, AssertionError, ArithmeticError, NameError),
 )  # what scipy, h5py and what they read with raise on bytes that are no such file
 PLACES = (0, 512)  # where an HDF5 file may begin; MATLAB writes a text of 512 bytes first
 
@@ -43,7 +43,7 @@ def read_mat(data: bytes, file: str) -> ArrayTable:
     except InputError:
         raise
     except DAMAGED as e:
-        raise InputError(f"not a MATLAB file ({e})", file=file) from e
+        raise InputError(f"not a MATLAB file ({first_line(e)})", file=file) from e
     return ArrayTable(file, arrays, {name: f"a MATLAB {kind}" for name, kind in classes.items() if name not in arrays})
 
 
@@ -73,7 +73,7 @@ def _read_hdf5(data: bytes, file: str) -> ArrayTable:
     except InputError:
         raise
     except DAMAGED as e:
-        raise InputError(f"not a MATLAB 7.3 file ({str(e).splitlines()[0] if str(e) else type(e).__name__})", file=file) from e
+        raise InputError(f"not a MATLAB 7.3 file ({first_line(e)})", file=file) from e
 
 
 def _unreadable(archive: Any, name: str, h5py: Any) -> str:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 from runtime.errors import InputError
 
+WIDEST = 10_000  # columns of a file; a wider one is no table of samples
+
 
 def check_names(wanted: Sequence[str], present: Sequence[str], file: str) -> Sequence[str]:
     """`wanted` itself if every name is present; InputError naming the missing and the present ones otherwise."""

@@ -13,36 +13,54 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
+from lzma import LZMAError
+from math import prod
 from pathlib import Path
+from tokenize import TokenError
 from typing import IO
 
 import numpy as np
 from numpy.lib import format as npy
 
-from runtime.errors import InputError
+from runtime.errors import InputError, first_line
 from runtime.io.arrays import ArrayBlock, ArrayTable, numeric
 from runtime.io.limits import require_size
-from runtime.io.naming import check_names
+from runtime.io.naming import WIDEST, check_names
 
 Array = np.ndarray
 
 DAMAGED = (
     *(ValueError, OSError, EOFError, AttributeError, zipfile.BadZipFile, zlib.error, struct.error),
-    *(NotImplementedError, RuntimeError, MemoryError, OverflowError),  # other compressions, passwords, shapes without the numbers
+    *(
+        NotImplementedError,
+        RuntimeError,
+        MemoryError,
+        OverflowError,
+        LZMAError,
+    ),  # other compressions, passwords, shapes without the numbers
+    *(SyntaxError, TokenError, TypeError, LookupError),  # headers that are no literal of Python
 )
 
 
 def read_npz(data: bytes, file: str) -> ArrayTable:
     """Table of the bytes of a .npz file."""
+    return ArrayTable(file, numeric(archive_of(data, file)))
+
+
+def archive_of(data: bytes, file: str) -> dict[str, Array]:
+    """Arrays by name of the bytes of a .npz file; InputError for pickled objects, damage, and more than such a file holds."""
     try:
         with zipfile.ZipFile(BytesIO(data)) as packed:
-            require_size(sum(member.file_size for member in packed.infolist()), len(data), file)
+            members = packed.infolist()
+            require_size(sum(member.file_size for member in members), len(data), file)
+            if len(members) > WIDEST:
+                raise InputError(f"{len(members)} arrays; at most {WIDEST} are read", file=file)
         with np.load(BytesIO(data), allow_pickle=False) as archive:
-            return ArrayTable(file, numeric({name: archive[name] for name in archive.files}))
+            return {name: archive[name] for name in archive.files}
     except InputError:
         raise
     except DAMAGED as e:
-        raise InputError(f"not an archive of plain arrays ({e})", file=file) from e
+        raise InputError(f"not an archive of plain arrays ({first_line(e)})", file=file) from e
 
 
 def read_npy(data: bytes, file: str) -> ArrayTable:
@@ -50,11 +68,17 @@ def read_npy(data: bytes, file: str) -> ArrayTable:
     try:
         x = np.load(BytesIO(data), allow_pickle=False)
     except DAMAGED as e:
-        raise InputError(f"not a file of one plain array ({e})", file=file) from e
-    if not isinstance(x, np.ndarray) or x.dtype.kind not in "biuf" or x.ndim not in (1, 2):
-        raise InputError("not an array of numbers of shape (N,) or (N, k)", file=file)
+        raise InputError(f"not a file of one plain array ({first_line(e)})", file=file) from e
+    if not isinstance(x, np.ndarray):
+        raise InputError("not a file of one plain array", file=file)
+    _require_columns(x.shape, x.dtype, file)
     columns = x.reshape(len(x), -1)
     return ArrayTable(file, {str(i + 1): columns[:, i] for i in range(columns.shape[1])})
+
+
+def _require_columns(shape: tuple[int, ...], dtype: np.dtype, file: str) -> None:
+    if dtype.kind not in "biuf" or len(shape) not in (1, 2) or not all(k > 0 for k in shape) or prod(shape[1:]) > WIDEST:
+        raise InputError(f"{dtype} of shape {shape}; expected numbers of shape (N,) or (N, k), at most {WIDEST} columns", file=file)
 
 
 @dataclass(frozen=True)
@@ -138,7 +162,7 @@ class ArrayBlocks:
         except DAMAGED as e:
             if isinstance(e, InputError):
                 raise
-            raise InputError(f"damaged file of arrays ({e}); copy it again", file=self.file) from e
+            raise InputError(f"damaged file of arrays ({first_line(e)}); copy it again", file=self.file) from e
 
     def _wanted(self, names: Sequence[str]) -> tuple[int, dict[str, Stored]]:
         """The common length of the named arrays, and these."""
@@ -162,7 +186,7 @@ def npz_blocks(path: Path, file: str) -> ArrayBlocks:
             members = [name for name in archive.namelist() if name.endswith(".npy")]
         found = {name[:-4]: _stored(partial(_member, path, name)) for name in members}
     except DAMAGED as e:
-        raise InputError(f"not an archive of plain arrays ({e})", file=file) from e
+        raise InputError(f"not an archive of plain arrays ({first_line(e)})", file=file) from e
     return ArrayBlocks(file, {name: x for name, x in found.items() if x.dtype.kind in "biuf"})
 
 
@@ -176,9 +200,8 @@ def npy_blocks(path: Path, file: str) -> ArrayBlocks:
     try:
         whole = _stored(lambda: path.open("rb"))
     except DAMAGED as e:
-        raise InputError(f"not a file of one plain array ({e})", file=file) from e
-    if whole.dtype.kind not in "biuf" or len(whole.shape) not in (1, 2):
-        raise InputError("not an array of numbers of shape (N,) or (N, k)", file=file)
+        raise InputError(f"not a file of one plain array ({first_line(e)})", file=file) from e
+    _require_columns(whole.shape, whole.dtype, file)
     return ArrayBlocks(file, {}, whole)
 
 

@@ -96,17 +96,18 @@ def open_stream(settings: RecordSettings, drives: Drives | None = None, *, folde
     first, last = tables[0], tables[-1]
     names = column_names(settings, first, last)
     samples = first.samples([*([] if names.t is None else [names.t]), *names.q])
+    others = last.samples(names.tau)
+    for table, count in ((first, samples), (last, others)):
+        if count < SHORTEST:
+            raise InputError(f"{count} samples; a record has at least {SHORTEST}", file=table.file)
     beginning, torques = next(first.blocks(names.q, SHORTEST)), next(last.blocks(names.tau, SHORTEST))
     q, tau = beginning.stack(names.q), torques.stack(names.tau)
-    others = last.samples(names.tau)
     if q.shape != tau.shape or others != samples:
         raise InputError(
             f"positions {(samples, q.shape[1])} in {first.file}, torques {(others, tau.shape[1])} in {last.file}; "
             "expected as many samples and joints in both"
         )
     n = q.shape[1]
-    if samples < SHORTEST:
-        raise InputError(f"{samples} samples; a record has at least {SHORTEST}", file=first.file)
     if drives is not None and drives.n != n:
         raise InputError(f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file)
     return FileStream(

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
-from runtime.errors import InputError
+from runtime.errors import InputError, first_line
 from runtime.io.arrays import ArrayBlock, ArrayTable
 from runtime.io.naming import check_names
 
 READ = 2**18  # rows read at a time: about one row group of the usual writers
+_SILENT = Lock()
 
 
 def read_parquet(data: bytes, file: str) -> ArrayTable:
     """Table of the numeric columns of the bytes of a Parquet file; missing values become nan."""
     polars = _polars(file)
-    try:
+    with _refused(polars, file):
         frame = polars.read_parquet(BytesIO(data))
         names = _numeric(polars, frame.schema)
         return ArrayTable(file, {name: frame[name].cast(polars.Float64).to_numpy() for name in names})
-    except (polars.exceptions.PolarsError, OSError) as e:
-        raise InputError(f"not a Parquet file ({_first_line(e)})", file=file) from e
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,23 +48,19 @@ class ParquetBlocks:
         wanted = list(dict.fromkeys(check_names(names, self.names, self.file)))
         lazy = polars.scan_parquet(self.path).select(polars.col(wanted).cast(polars.Float64))
         step = max(READ // size, 1) * size
-        try:
-            for a in range(0, self.rows, step):
+        for a in range(0, self.rows, step):
+            with _refused(polars, self.file):
                 read = lazy.slice(a, step).collect().to_numpy()
-                for b in range(0, len(read), size):
-                    yield ArrayBlock(self.file, {name: read[b : b + size, i] for i, name in enumerate(wanted)}, first=a + b)
-        except (polars.exceptions.PolarsError, OSError) as e:
-            raise InputError(f"damaged Parquet file ({_first_line(e)}); copy it again", file=self.file) from e
+            for b in range(0, len(read), size):
+                yield ArrayBlock(self.file, {name: read[b : b + size, i] for i, name in enumerate(wanted)}, first=a + b)
 
 
 def parquet_blocks(path: Path, file: str) -> ParquetBlocks:
     """A Parquet file to be read by blocks."""
     polars = _polars(file)
-    try:
+    with _refused(polars, file):
         schema = polars.read_parquet_schema(path)
         rows = int(polars.scan_parquet(path).select(polars.len()).collect().item())
-    except (polars.exceptions.PolarsError, OSError) as e:
-        raise InputError(f"not a Parquet file ({_first_line(e)})", file=file) from e
     return ParquetBlocks(path, file, tuple(_numeric(polars, schema)), rows)
 
 
@@ -78,5 +76,16 @@ def _numeric(polars: Any, schema: Any) -> list[str]:
     return [name for name, kind in schema.items() if kind.is_numeric() or kind == polars.Boolean]
 
 
-def _first_line(e: Exception) -> str:
-    return str(e).splitlines()[0] if str(e) else type(e).__name__
+@contextmanager
+def _refused(polars: Any, file: str) -> Iterator[None]:
+    """Damage as one InputError. Polars panics on some of it, and its threads then write their stacks to the error stream: not here."""
+    with _SILENT, open(os.devnull, "w") as nowhere:  # noqa: PTH123
+        kept = os.dup(2)
+        os.dup2(nowhere.fileno(), 2)
+        try:
+            yield
+        except (polars.exceptions.PolarsError, polars.exceptions.PanicException, OSError, MemoryError) as e:
+            raise InputError(f"damaged, or not a Parquet file ({first_line(e)}); write it again", file=file) from e
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import TextIOWrapper
@@ -12,9 +13,12 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.io.files import opened
-from runtime.io.naming import check_names
+from runtime.io.naming import WIDEST, check_names
 
 Array = np.ndarray
+
+LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits each
+MOST = 10_000_000  # lines held at once, some 80 bytes each beside their text
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +98,8 @@ def _numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
     """Lines that hold something, comments aside, with their numbers from 1."""
     try:
         with opened(path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
-            for k, raw in enumerate(text, start=1):
+            for k, raw in enumerate(iter(lambda: text.readline(LONGEST + 1), ""), start=1):
+                _require_short(len(raw), path.name, k)
                 line = raw.strip()
                 if line and not line.startswith("#"):
                     yield k, line
@@ -108,7 +113,14 @@ def read_text(data: bytes, file: str) -> TextTable:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as e:
         raise InputError(f"not a text file in UTF-8 (byte {e.start})", file=file) from None
-    lines: Sequence[str] = tuple(map(str.strip, text.splitlines()))
+    if max(text.count("\n"), text.count("\r")) > MOST:
+        raise InputError(f"more than {MOST} lines; read them by blocks (stream: 65536 in the study file, or --block)", file=file)
+    rows = (
+        text.replace("\r\n", "\n").replace("\r", "\n").removesuffix("\n").split("\n")
+    )  # as a file is read; splitlines knows more ends of lines
+    longest = max(map(len, rows))
+    _require_short(longest, file, next(k for k, row in enumerate(rows, start=1) if len(row) == longest))
+    lines: Sequence[str] = tuple(map(str.strip, rows))
     numbers: Sequence[int] = range(1, len(lines) + 1)
     if "#" in text or not all(lines):
         kept = [(k, line) for k, line in zip(numbers, lines, strict=True) if line and not line.startswith("#")]
@@ -127,9 +139,11 @@ def _header(line: str, file: str) -> tuple[tuple[str, ...], bool, str | None]:
     """Names of the columns by the first line, whether it is a header, and the delimiter."""
     delimiter = _delimiter(line)
     header = _fields(line, delimiter)
+    if len(header) > WIDEST:
+        raise InputError(f"{len(header)} columns; at most {WIDEST} are read, write those you need into a file of their own", file=file)
     if all(_is_number(x) for x in header):
         return tuple(str(i + 1) for i in range(len(header))), False, delimiter
-    double = sorted({name for name in header if header.count(name) > 1})
+    double = sorted(name for name, count in Counter(header).items() if count > 1)
     if double:
         raise InputError(f"header names {', '.join(double)} more than once", file=file)
     return tuple(header), True, delimiter
@@ -142,6 +156,11 @@ def _table(lines: Sequence[str], numbers: Sequence[int], names: tuple[str, ...],
         k, width = next((k, width) for k, width in zip(numbers, widths, strict=True) if width != len(names))
         raise InputError(f"{width} fields; expected {len(names)} ({', '.join(names)})", file=file, row=f"line {k}")
     return TextTable(file, names, tuple(lines), numbers, delimiter)
+
+
+def _require_short(length: int, file: str, number: int) -> None:
+    if length > LONGEST:
+        raise InputError(f"a line of more than {LONGEST} characters; expected one sample a line", file=file, row=f"line {number}")
 
 
 def _delimiter(line: str) -> str | None:

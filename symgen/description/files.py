@@ -1,4 +1,4 @@
-"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par` and URDF, by suffix."""
+"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par`, URDF and MJCF, by suffix."""
 
 from __future__ import annotations
 
@@ -20,24 +20,28 @@ def packaged_robots() -> tuple[str, ...]:
     return tuple(sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml")))
 
 
-def load_robot(source: str | Path) -> Robot:
+def load_robot(source: str | Path, *, keep_fixed: bool = False) -> Robot:
     """The robot described by a file, or a packaged one by its name.
 
     Parameters
     ----------
-    source : name of a packaged robot (`tx40`) or path of a robot file (`arm.yaml`, `./tx40`), a `.par` file or a `.urdf`.
+    source : name of a packaged robot (`tx40`) or path of a robot file (`arm.yaml`, `./tx40`), a `.par` file, a `.urdf`, or an MJCF
+        (`.xml`, `.mjcf`; extra `mjcf`).
+    keep_fixed : of a URDF or MJCF, keep links that fixed joints hold as fixed frames, as `read_urdf`.
 
     Raises
     ------
     DescriptionError : the file cannot be read or describes no robot; names file and line.
     """
-    return read_robot(source)[0]
+    return read_robot(source, keep_fixed=keep_fixed)[0]
 
 
-def read_robot(source: str | Path, *, constants: Mapping[str, float] | None = None, nearly: float = 0.0) -> tuple[Robot, tuple[str, ...]]:
+def read_robot(
+    source: str | Path, *, constants: Mapping[str, float] | None = None, nearly: float = 0.0, keep_fixed: bool = False
+) -> tuple[Robot, tuple[str, ...]]:
     """As `load_robot`, with notes on what of a foreign format was read otherwise than written, or not at all.
 
-    constants : values of the symbols of a `.par` file, which has no place for them.   nearly : rad, as `read_urdf`.
+    constants : values of the symbols of a `.par` file, which has no place for them.   nearly, keep_fixed : as `read_urdf`.
     """
     if source in packaged_robots():
         file = f"{source}.yaml"
@@ -49,13 +53,19 @@ def read_robot(source: str | Path, *, constants: Mapping[str, float] | None = No
     if path.suffix.lower() == ".urdf":
         from symgen.description.urdf import read_urdf  # numpy, which robot files do without
 
-        return read_urdf(content, path.name, nearly=nearly)
+        return read_urdf(content, path.name, nearly=nearly, keep_fixed=keep_fixed)
+    if path.suffix.lower() in (".xml", ".mjcf"):
+        from symgen.description.mjcf import read_mjcf  # mujoco, an extra
+
+        return read_mjcf(content, path.name, keep_fixed=keep_fixed)
     return parse_robot(content, path.name), ()
 
 
 def _read(path: Path) -> bytes:
     known = ", ".join(packaged_robots())
     try:
+        if path.exists() and not path.is_file():  # a pipe may never answer, a device never end
+            raise OSError(0, "it is a folder, a pipe or a device")
         with path.open("rb") as stream:
             return stream.read(MAX_BYTES + 1)
     except FileNotFoundError as error:
