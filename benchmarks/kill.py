@@ -1,0 +1,200 @@
+"""SIGKILL at random moments of the commands that write: is every file old or new, is the set of one run, does a rerun end as if nothing had been?
+
+    python benchmarks/kill.py [VERB...] [--kills 50] [--seed 1]        generate identify cestac report
+
+Each command runs over a folder that holds the results of an earlier one (other robot constants, another record) and a file of the user. Half of the kills come
+uniformly over the time of an undisturbed run, half within the time its writing takes, from the moment the folder of unfinished files appears. After each:
+
+    whole      every file has the bytes of the old run or of the new one, the user's file is his
+    one set    all are old, or all new; or the rest of the new ones stands in .symgen-finished, for the next command to move up
+    rerun      the same command ends with the exit code and bytes of the undisturbed run, and leaves nothing else
+
+cestac keeps its runs every 0.02 s here, instead of every 30, so that kills meet archives. Exit code 1 where a kill broke one of these.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from runtime import load_model
+from symgen import load_robot
+from symgen.cli.main import VERBS
+from symgen.cli.writing import FINISHED, LOCK, UNFINISHED
+from symgen.emit import generate_module
+
+MAIN = "from symgen.cli.main import main; main()"
+OFTEN = "from runtime.checkpoint import Checkpoint; Checkpoint.__init__.__kwdefaults__['every'] = 0.02; " + MAIN
+ROBOT = "planar_2r"
+NOTE = "of the user"
+
+
+def write_record(path: Path, seed: int, duration: float = 4.0, rate: float = 500.0) -> None:
+    """Positions and torques of the packaged arm on sums of sines, noise on the torques."""
+    with TemporaryDirectory() as folder:
+        module = Path(folder) / f"{ROBOT}.py"
+        module.write_text(generate_module(load_robot(ROBOT)), encoding="utf-8")
+        model = load_model(module)
+        generator = np.random.default_rng(seed)
+        t = np.arange(int(duration * rate)) / rate
+        w = 2 * np.pi * np.array([0.5, 1.25, 2.5])
+        phase = generator.uniform(0, 2 * np.pi, (2, 3))
+        angle = t[:, None, None] * w + phase
+        amplitude = np.array([0.8, 0.4, 0.2])
+        q, qd, qdd = ((amplitude * x).sum(-1) for x in (np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)))
+        X = 1.0 + np.arange(len(model.BASE_PARAMETERS)) / 4
+        tau = model.inverse_dynamics(q, qd, qdd, X) + 0.05 * generator.standard_normal(q.shape)
+    np.savetxt(path, np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="", fmt="%.12g")
+
+
+class Job:
+    """One command, in a version `old` and a version `new` that write the same files."""
+
+    def __init__(self, folder: Path, verb: str, old: Sequence[str], new: Sequence[str], code: str = MAIN) -> None:
+        self.folder, self.verb, self.arguments, self.code = folder, verb, {"old": old, "new": new}, code
+
+    def start(self, which: str, out: Path) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-c", self.code, self.verb, *self.arguments[which], "-o", out.name]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        return subprocess.Popen(command, cwd=self.folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+    def run(self, which: str, out: Path) -> int:
+        process = self.start(which, out)
+        said = process.communicate()[1].decode()
+        if process.returncode not in (0, 1) or "Traceback" in said:
+            raise RuntimeError(f"{self.verb} ended with {process.returncode}: {said}")
+        return process.returncode
+
+
+def jobs(folder: Path) -> dict[str, Job]:
+    """The commands, over files made in `folder`."""
+    write_record(folder / "old.csv", seed=1)
+    write_record(folder / "new.csv", seed=2)
+    text = (files("symgen.description") / "robots" / f"{ROBOT}.yaml").read_text(encoding="utf-8")
+    for which, gravity in (("old", "9.81"), ("new", "9.80665")):
+        (folder / which).mkdir()
+        (folder / which / "arm.yaml").write_text(text.replace("9.81", gravity), encoding="utf-8")
+    pairs = {which: [ROBOT, f"{which}.csv"] for which in ("old", "new")}
+    robots = {which: [f"{which}/arm.yaml", "emps", "--target", "numpy,casadi,c,xp"] for which in ("old", "new")}
+    study = {which: [*pairs[which], "--delta", "2*pi/5000", "--delta", "2*pi/1000", "--runs", "150"] for which in pairs}
+    found = {"generate": Job(folder, "generate", **robots), "identify": Job(folder, "identify", **pairs)}
+    found["cestac"] = Job(folder, "cestac", **study, code=OFTEN)
+    if "report" in VERBS:
+        found["report"] = Job(folder, "report", **pairs)
+    return found
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file, hidden ones too, by its path."""
+    found = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in found}
+
+
+def judged(folder: Path, old: dict[str, str], new: dict[str, str]) -> str:
+    """What a killed run left: "old", "new" or "to complete"; RuntimeError where it is anything else."""
+    if (folder / "notes.txt").read_text() != NOTE:
+        raise RuntimeError("the user's file changed")
+    found = digests(folder)
+    shown = {name: digest for name, digest in found.items() if name in new}
+    waiting = {name.partition("/")[2]: digest for name, digest in found.items() if name.startswith(f"{FINISHED}/")}
+    others = [
+        name
+        for name in found
+        if name not in new and name != "notes.txt" and name.partition("/")[0] not in (LOCK, UNFINISHED, FINISHED, "runs")
+    ]
+    if others or set(shown) != set(new):
+        raise RuntimeError(f"files {others} are left, {sorted(set(new) - set(shown))} are missing")
+    half = [name for name, digest in shown.items() if digest not in (old[name], new[name])]
+    half += [name for name, digest in waiting.items() if digest != new[name]]
+    if half:
+        raise RuntimeError(f"{half} are neither old nor new")
+    if shown == old and not waiting:
+        return "old"
+    if all(digest == new[name] or waiting.get(name) == new[name] for name, digest in shown.items()):
+        return "to complete" if waiting else "new"
+    raise RuntimeError("files of two runs are mixed")
+
+
+def survived(job: Job, kills: int, chance: random.Random) -> Counter[str]:
+    """Counts of what `kills` kills left; RuntimeError at the first that broke something."""
+    base, fresh = job.folder / f"{job.verb}-old", job.folder / f"{job.verb}-new"
+    job.run("old", base)
+    begin = time.monotonic()
+    code = job.run("new", fresh)
+    duration = time.monotonic() - begin
+    old, new = digests(base), digests(fresh)
+    if old.keys() != new.keys() or any(old[name] == new[name] for name in new if name != "study.yaml" and not name.startswith("emps")):
+        raise RuntimeError("the two runs write other files, or the same")
+    writing = write_time(job, base)
+    counts: Counter[str] = Counter()
+    for k in range(kills):
+        out = job.folder / f"{job.verb}-out"
+        shutil.rmtree(out, ignore_errors=True)
+        shutil.copytree(base, out)
+        (out / "notes.txt").write_text(NOTE)
+        process = job.start("new", out)
+        if k % 2:
+            while process.poll() is None and not (out / UNFINISHED).exists():
+                pass
+            time.sleep(chance.uniform(0, writing))
+        else:
+            time.sleep(chance.uniform(0, duration))
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        state = "finished" if process.returncode != -signal.SIGKILL else judged(out, old, new)
+        if (out / "runs").is_dir():
+            counts["with runs to go on from"] += 1
+        counts[state] += 1
+        counts["while writing"] += (out / UNFINISHED).exists() or (out / FINISHED).exists()
+        if job.run("new", out) != code or digests(out) != new | {"notes.txt": hashlib.sha256(NOTE.encode()).hexdigest()}:
+            raise RuntimeError(f"the rerun differs: {sorted(set(digests(out).items()) ^ set(new.items()))}")
+    print(f"{job.verb:<10}{kills} kills in runs of {duration:.2f} s, of which writing {1000 * writing:.0f} ms:", dict(counts), flush=True)
+    return counts
+
+
+def write_time(job: Job, base: Path) -> float:
+    """s from the appearance of the folder of unfinished files to the disappearance of that of finished ones."""
+    out = job.folder / f"{job.verb}-timed"
+    shutil.copytree(base, out)
+    process = job.start("new", out)
+    while process.poll() is None and not (out / UNFINISHED).exists():
+        pass
+    begin = time.monotonic()
+    while process.poll() is None and ((out / UNFINISHED).exists() or (out / FINISHED).exists()):
+        pass
+    found = time.monotonic() - begin
+    process.communicate()
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("verbs", nargs="*", metavar="VERB")
+    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    with TemporaryDirectory(prefix="kill-") as folder:
+        known = jobs(Path(folder))
+        for verb in given.verbs or known:
+            try:
+                survived(known[verb], given.kills, random.Random(given.seed))
+            except RuntimeError as e:
+                sys.exit(f"{verb}: {e}")
+
+
+if __name__ == "__main__":
+    main()
