@@ -84,7 +84,7 @@ class Chart {
     this.width = Math.max(40, width - this.left - 10);
     const root = svgNode("svg", { viewBox: `0 0 ${width} 330`, height: 330, "aria-hidden": "true" });
     svgNode("rect", { x: this.left, y: 0, width: this.width, height: 300 }, svgNode("clipPath", { id: `clip${this.group.charts.indexOf(this)}` }, root));
-    for (const [value, label] of ticks(a, b, Math.max(2, this.width / 90))) {
+    for (const [value, label] of ticks(a, b, Math.max(2, this.width / 60))) {
       const x = this.x(value);
       for (const panel of [upper, lower]) svgNode("line", { class: "grid", x1: x, x2: x, y1: panel.top, y2: panel.top + panel.height }, root);
       svgNode("text", { x, y: 304, "text-anchor": "middle" }, root, label);

@@ -32,7 +32,7 @@ class Table:
     """Cells are text or Markup; the first of a row names it and stands to the left, the others to the right. `note` follows the table.
 
     wide : numbers of columns (from 0) of words, to the left.   sortable : by any column, where scripts run.
-    kinds : one word per row; a button `only` then leaves the rows of the first kind.
+    kinds : one word per row; a button `only` then leaves the rows of the first kind.   stacked : on a narrow screen every row is a block of lines.
     """
 
     caption: str
@@ -43,6 +43,7 @@ class Table:
     sortable: bool = False
     kinds: Sequence[str] = ()
     only: str = ""
+    stacked: bool = False
 
     def __post_init__(self) -> None:
         wrong = [row for row in self.rows if len(row) != len(self.header)]
@@ -64,8 +65,8 @@ class Matrix:
 
     @property
     def cells(self) -> list[list[tuple[str, int]]]:
-        """(text, shade from 0 to 4) by row."""
-        return [[(f"{x:+.2f}".replace("-", "−"), min(4, int(5 * abs(x)))) for x in row] for row in self.values]
+        """(text, shade from 0 to 4) by row; what rounds to nothing is 0."""
+        return [[(f"{x:+.2f}".replace("-", "−") if abs(x) >= 0.005 else "0", min(4, int(5 * abs(x)))) for x in row] for row in self.values]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,11 @@ def checks_section(judgement: Judgement) -> Section:
     """Question, answer, limit, remedy."""
     rows = [(c.question, told(c.state), c.found, c.limit, "" if c.state == "good" else c.remedy) for c in judgement.checks]
     table = Table(
-        "The verdict is the worst of these", ("question", "answer", "found", "good within", "what to do"), rows, wide=(1, 2, 3, 4)
+        "The verdict is the worst of these",
+        ("question", "answer", "found", "good within", "what to do"),
+        rows,
+        wide=(2, 3, 4),
+        stacked=True,
     )
     return Section("Checks", tables=[table])
 
