@@ -208,13 +208,15 @@ class ValidateSettings:
 class PayloadSettings:
     """Records with a load fixed to a link, beside those of the study without it.
 
-    link : number of the link that carries it; default: the last.   known : of XX XY XZ YY YZ ZZ MX MY MZ M of the load, at the frame of
-    the link, what was weighed or computed, SI.   friction : the loaded records have friction of their own.
+    link : number of the link that carries it; default: the last, or the one that carries the frame.   frame : any frame fixed to that link,
+    such as a tool frame (sigma 2), at which its parameters are meant; default: that of the link.   known : of XX XY XZ YY YZ ZZ MX MY MZ M
+    of the load, at that frame, what was weighed or computed, SI.   friction : the loaded records have friction of their own.
     gains : also estimate the torque constants of the drives from the load; its M must be known.
     """
 
     record: tuple[RecordSettings, ...] = ()
     link: int | None = None
+    frame: int | None = None
     known: Mapping[str, float] = field(default_factory=dict)
     friction: bool = False
     gains: bool = False
