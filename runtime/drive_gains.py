@@ -130,12 +130,12 @@ def _observed(model: GeneratedModel, record: Record, study: Study, drives: Drive
 def _with_load(model: GeneratedModel, seen: Observation, settings: PayloadSettings, load: float) -> Observation:
     """Columns W, W_Lu (times load), the torque of the known part of the load, motors."""
     physical = physical_model(model)
-    _, unknown, columns, chi = carried(physical, settings)
+    own = carried(model, physical, settings)
     b = len(model.BASE_PARAMETERS)
     W, V = seen.W[:, :b], seen.W[:, b:]
-    known = load * (W @ (physical.K @ chi))
-    names = (*seen.names[:b], *(f"{family} of the load" for family in unknown), "known load", *seen.names[b:])
-    return replace(seen, W=np.asfortranarray(np.column_stack([W, load * (W @ physical.K[:, columns]), known, V])), names=names)
+    known = load * (W @ own.known)
+    names = (*seen.names[:b], *(f"{family} of the load" for family in own.unknown), "known load", *seen.names[b:])
+    return replace(seen, W=np.asfortranarray(np.column_stack([W, load * (W @ own.columns), known, V])), names=names)
 
 
 def _alone(seen: Observation, exact: Array, load: Array, V: Array, drives: Drives) -> tuple[Array, Array, Array]:

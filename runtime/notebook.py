@@ -84,7 +84,9 @@ def element(tag: str, *children: str, **attributes: str) -> Markup:
 
 
 def _row(tag: str, cells: Sequence[str]) -> Markup:
-    return element("tr", *(element(tag, cell, style=f"text-align:{'right' if k else 'left'}") for k, cell in enumerate(cells)))
+    return element(
+        "tr", *(element(tag, cell, style=f"padding:0 0.6em;text-align:{'right' if k else 'left'}") for k, cell in enumerate(cells))
+    )
 
 
 def _quality(fit: Estimate) -> str:

@@ -15,7 +15,7 @@ def loads_section(found: Loads) -> Section:
         second = ("-", "-") if apart is None else (number(apart.value[k], ".5g"), number(apart.sigma[k], ".2g"))
         rows.append((name, number(joint.value[k], ".5g"), number(joint.sigma[k], ".2g"), *second))
     header = ("parameter", "joint solution", "sigma", "difference of two estimates", "sigma")
-    tables = [Table(f"Load on link {joint.link}, at the frame of that link, SI", header, rows)]
+    tables = [Table(f"Load on {joint.place}, its parameters there, SI", header, rows)]
     text = ["Records with and without the load, fitted together; the difference of two separate estimates beside it."]
     if found.gains is not None:
         gains = found.gains

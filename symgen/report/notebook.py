@@ -7,7 +7,7 @@ from symgen.report import mathml
 from symgen.report.latex import latex_formula, latex_name
 from symgen.report.mathml import MathML, element
 
-LEFT = "text-align:left"
+LEFT = "padding:0 0.6em;text-align:left"
 
 
 def regrouping_html(regrouping: Regrouping) -> str:
