@@ -1,0 +1,142 @@
+"""Results in a folder: killed before every act on the file system, two commands at once, full disks."""
+
+import os
+import resource
+import signal
+import sys
+
+import pytest
+
+from symgen.cli.writing import FINISHED, LOCK, UNFINISHED, OutputError, reserved, write_all
+
+NAMES = ("a.txt", "b.txt", "c.txt")
+OLD, NEW = dict.fromkeys(NAMES, "old"), dict.fromkeys(NAMES, "new")
+ACTS = ("open", "os.mkdir", "os.rename", "os.remove", "os.rmdir")
+
+
+def forked(work):
+    """Exit status of a child process that does `work`."""
+    child = os.fork()
+    if child == 0:
+        try:
+            work()
+        finally:
+            os._exit(0)
+    return os.waitpid(child, 0)[1]
+
+
+def texts(folder):
+    return {path.name: path.read_text() for path in folder.iterdir() if path.is_file() and path.name != LOCK}
+
+
+def killed_before(act, folder):
+    """A run that is killed before its act number `act`; False where it ended before."""
+
+    def work():
+        left = [act]
+
+        def count(event, arguments):
+            if event in ACTS:
+                left[0] -= 1
+                if left[0] < 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+        sys.addaudithook(count)
+        write_all(folder, NEW)
+        left[0] = 10**9
+
+    return os.WIFSIGNALED(forked(work))
+
+
+def test_killed_before_every_act(tmp_path):
+    """Old or new, never a mixture that nobody completes; the next command leaves nothing of it."""
+    act, seen = 0, set()
+    while True:
+        folder = tmp_path / str(act)
+        write_all(folder, OLD)
+        (folder / "notes.txt").write_text("of the user")
+        if not killed_before(act, folder):
+            break
+        found = texts(folder)
+        assert found.pop("notes.txt") == "of the user" and set(found) == set(NAMES)
+        if (folder / FINISHED).is_dir():
+            assert {**found, **texts(folder / FINISHED)} == NEW
+            seen.add("to complete")
+        else:
+            assert found in (OLD, NEW)
+            seen.add(found["a.txt"])
+        write_all(folder, {"d.txt": "another"})
+        assert texts(folder) in ({**state, "d.txt": "another", "notes.txt": "of the user"} for state in (OLD, NEW))
+        assert not [name for name in (LOCK, UNFINISHED, FINISHED) if (folder / name).exists()]
+        act += 1
+    assert seen == {"old", "new", "to complete"} and act > 8
+    assert texts(folder) == {**NEW, "notes.txt": "of the user"}
+
+
+def test_second_command_is_told_who_writes_and_a_killed_one_is_no_obstacle(tmp_path):
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        with reserved(tmp_path / "out"):
+            os.write(write, b"held")
+            signal.pause()
+        os._exit(0)
+    try:
+        assert os.read(read, 4) == b"held"
+        with pytest.raises(OutputError, match=f"process {child} on .* since .* UTC"), reserved(tmp_path / "out"):
+            pass
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert (tmp_path / "out" / LOCK).exists()
+    write_all(tmp_path / "out", NEW)
+    assert texts(tmp_path / "out") == NEW and not (tmp_path / "out" / LOCK).exists()
+
+
+def test_two_at_once_do_not_mix(tmp_path):
+    def work(name):
+        for k in range(40):
+            write_all(tmp_path, dict.fromkeys(NAMES, f"{name}{k}"))
+
+    children = []
+    for name in "xy":
+        child = os.fork()
+        if child == 0:
+            try:
+                work(name)
+            except BaseException:
+                os._exit(1)
+            os._exit(0)
+        children.append(child)
+    assert [os.waitpid(child, 0)[1] for child in children] == [0, 0]
+    assert len(set(texts(tmp_path).values())) == 1 and sorted(p.name for p in tmp_path.iterdir()) == list(NAMES)
+
+
+def test_a_limit_of_file_sizes_leaves_the_old_files(tmp_path):
+    write_all(tmp_path, OLD)
+
+    def work():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+        try:
+            write_all(tmp_path, {**NEW, "b.txt": "x" * 5000})
+        except OutputError as e:
+            os._exit(7 if "nothing was changed" in str(e) else 8)
+
+    assert os.waitstatus_to_exitcode(forked(work)) == 7
+    assert texts(tmp_path) == OLD and sorted(p.name for p in tmp_path.iterdir()) == list(NAMES)
+
+
+@pytest.mark.parametrize(
+    ("place", "words"), [("file/out", "a file is where a folder"), ("file", "a file is where a folder"), ("x" * 300, "shorter name")]
+)
+def test_places_that_cannot_be_written(place, words, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(OutputError, match=words):
+        write_all(tmp_path / place, NEW)
+    assert (tmp_path / "file").read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_nothing_written_leaves_no_folder(tmp_path):
+    with pytest.raises(KeyError), reserved(tmp_path / "new folder" / "größe"):
+        raise KeyError
+    assert list(tmp_path.iterdir()) == []
