@@ -112,7 +112,7 @@ def initial(loop: ClosedLoop, seen: Observation, which: str | Mapping[str, float
     model: Any = loop.model
     standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)
     if which == "values":
-        values = dict(model.VALUES)
+        values = dict.fromkeys(model.NO_EFFECT, 0.0) | dict(model.VALUES)
         if missing := [name for name in standard if name not in values]:
             raise SettingsError(
                 f"{model.NAME} has no value of {', '.join(missing[:6])}; use start and gains: ols", path=("estimate", "options")

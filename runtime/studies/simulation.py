@@ -258,8 +258,8 @@ def simulate(model: GeneratedModel, X: Array, controller: Controller, reference:
 
 
 def parameters_of(model: GeneratedModel, controller: Controller) -> Array:
-    """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in their place."""
-    values = {**model.VALUES, **controller.values}
+    """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in their place; 0 for those without effect."""
+    values = {**dict.fromkeys(model.NO_EFFECT, 0.0), **model.VALUES, **controller.values}  # type: ignore[attr-defined]
     if missing := [name for name in model.STANDARD_PARAMETERS if name not in values]:  # type: ignore[attr-defined]
         raise SettingsError(
             f"{model.NAME} has no value of {', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the robot file or here",

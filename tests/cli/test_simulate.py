@@ -1,6 +1,7 @@
 """`symgen simulate`: a record that `identify` reads back, with its reference; bad input as one line."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -74,3 +75,21 @@ def test_without_controller_and_without_casadi_model(tmp_path):
     assert "no section `controller`" in run("simulate", "emps", tmp_path / "empty.yaml").stderr
     (tmp_path / "loop.yaml").write_text(STUDY.replace("p: [[", "p: [[0.0, 0, 0, 0, 0, 0, 0], ["))
     assert run("simulate", "five_bar", tmp_path / "loop.yaml").exit_code == 2
+
+
+def test_parameters_without_effect_need_no_value(tmp_path: Path) -> None:
+    """A carriage needs a mass and friction; its tensor was asked for, too, and `excite` ended in a traceback."""
+    robot = tmp_path / "axis.yaml"
+    robot.write_text(
+        "symgen: 1\nname: axis\ngravity: [-9.81, 0, 0]\nframes: {1: {ant: 0, sigma: 1, alpha: 0, d: 0, theta: 0, r: q1}}\n"
+        "elements: {FV: {kind: viscous, along: all}}\nlimits: {q: [0.3], qd: [0.5], qdd: [2]}\nvalues: {M1: 95, FV1: 200}\n"
+    )
+    study = tmp_path / "loop.yaml"
+    study.write_text("controller: {law: {kind: pid, kp: 150000, kd: 9000}, rate: 1000, reference: {points: {duration: 2, seed: 1}}}\n")
+    done = CliRunner().invoke(app, ["simulate", str(robot), str(study)])
+    assert done.exit_code == 0, done.output
+    robot.write_text(robot.read_text().replace("M1: 95, ", ""))
+    for verb in (["simulate", str(robot), str(study)], ["excite", str(robot)]):
+        refused = CliRunner().invoke(app, verb)
+        assert refused.exit_code == 2
+        assert "M1" in refused.output
