@@ -1,13 +1,13 @@
 """Plain mappings to frozen dataclasses and back, with the path of the offending key in every error.
 
 The type hints of a dataclass are its schema: dataclass, Literal, str, int, float, bool, tuple[X, ...], tuple[X, Y], Mapping, unions with None.
-A float may be an arithmetic text (`2*pi/10000`); one value stands for a list of one; an integer key stands for its text.
+A float may be an arithmetic text (`2*pi/10000`), a field with a reader of its own what that understands (`30 rpm`); one value stands for a list of one; an integer key stands for its text.
 """
 
 from __future__ import annotations
 
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -31,11 +31,20 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
     if missing := [name for name in needed if name not in value]:
         raise SettingsError(f"no key {', '.join(missing)}; add it", path=path)
     hints = get_type_hints(cls)
-    arguments = {k: _convert(hints[k], v, (*path, k)) for k, v in value.items()}
+    read = {f.name: f.metadata["read"] for f in fields(cls) if "read" in f.metadata}  # type: ignore[arg-type]
+    arguments = {k: _convert(hints[k], _read(read[k], v, (*path, k)) if k in read else v, (*path, k)) for k, v in value.items()}
     try:
         return cls(**arguments)
     except SettingsError as e:
         raise SettingsError(e.reason, path=(*path, *e.path)) from None
+    except InputError as e:
+        raise SettingsError(e.message, path=path) from None
+
+
+def _read(reader: Callable[[Any], Any], value: Any, path: Path) -> Any:
+    """The value as the reader of its field, `metadata={"read": ...}`, understands it."""
+    try:
+        return reader(value)
     except InputError as e:
         raise SettingsError(e.message, path=path) from None
 

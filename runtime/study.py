@@ -17,16 +17,14 @@ from math import pi
 from typing import Any, Literal
 
 from runtime.controller_settings import Controller
-from runtime.errors import SettingsError
+from runtime.errors import InputError, SettingsError
 from runtime.excitation_settings import ExcitationSettings
+from runtime.io.units import position_unit, speed, time_unit, torque_unit
 from runtime.mapping import plain, structure
 
 SCHEMA = 1
 SHORTEST = 10  # samples of a record, or of a block of one: fewer cannot be filtered nor differentiated twice
 
-PositionUnit = Literal["rad", "deg", "rev", "counts", "m", "mm"]
-TorqueUnit = Literal["N*m", "N", "A", "V"]
-TimeUnit = Literal["s", "ms"]
 Number = float | tuple[float, ...]  # one for all joints, or one per joint
 
 
@@ -46,11 +44,23 @@ class Columns:
 
 @dataclass(frozen=True)
 class Units:
-    """Units of the columns: one, or one per joint. A and V are turned into torque by the torque constant."""
+    """Units of the columns: one, or one per joint, by any name that `runtime.io.units` knows: rad, deg, counts, mm; N*m, mA, ozf*inch; s, us.
 
-    t: TimeUnit = "s"
-    q: PositionUnit | tuple[PositionUnit, ...] = "rad"
-    tau: TorqueUnit | tuple[TorqueUnit, ...] = "N*m"
+    Counts need the counts per revolution; units of current and voltage are turned into torque by the torque constant.
+    """
+
+    t: str = "s"
+    q: str | tuple[str, ...] = "rad"
+    tau: str | tuple[str, ...] = "N*m"
+
+    def __post_init__(self) -> None:
+        for key, check in (("t", time_unit), ("q", position_unit), ("tau", torque_unit)):
+            given = getattr(self, key)
+            for i, unit in enumerate(given if isinstance(given, tuple) else (given,)):
+                try:
+                    check(unit)
+                except InputError as e:
+                    raise SettingsError(e.message, path=(key, i) if isinstance(given, tuple) else (key,)) from None
 
 
 @dataclass(frozen=True)
@@ -69,7 +79,7 @@ class RecordSettings:
     side : "motor" (qm = R (q - offset), tau = R' u, by the drives of the robot) or "joint".
     rate : sampling rate, Hz; may be left out where there is a time column.
     counts_per_revolution : where the unit of q is counts.
-    torque_constant : N*m/A or N*m/V where the unit of tau is A or V; default: that of the robot's drives.
+    torque_constant : N*m/A or N*m/V where the unit of tau is one of current or voltage (A, mA, V); default: that of the robot's drives.
     coupling : use the off-diagonal part of R for "both", for "position" or "torque" alone, or for "none".
     jitter : largest deviation of the time column from a uniform grid, in sampling periods.
     topic : of a bag, where it holds several of sensor_msgs/JointState.
@@ -95,7 +105,7 @@ class RecordSettings:
         _require(0 < self.jitter < 0.5, ("jitter",), f"{self.jitter}; expected a fraction of a sampling period between 0 and 0.5")
         units = self.units.q if isinstance(self.units.q, tuple) else (self.units.q,)
         _require(
-            "counts" not in units or self.counts_per_revolution is not None,
+            self.counts_per_revolution is not None or all(position_unit(unit)[0] != "counts" for unit in units),
             ("counts_per_revolution",),
             "missing; positions in counts need it",
         )
@@ -156,12 +166,12 @@ class Rows:
 
     window : [t0, t1] in s, applied before the regressor is evaluated; null leaves an end open.
     trim : decimated samples left out at each end of the window, where the filters start.
-    low_speed : rows of joint j with |qd_j| below it are left out (rad/s or m/s): there sign(qd) is noise.
+    low_speed : rows of joint j with |qd_j| below it are left out: there sign(qd) is noise. rad/s or m/s; a text may have another unit, "2 rpm".
     """
 
     window: tuple[float | None, float | None] = (None, None)
     trim: int = 3
-    low_speed: Number = 0.0
+    low_speed: Number = field(default=0.0, metadata={"read": speed})
 
     def __post_init__(self) -> None:
         t0, t1 = self.window

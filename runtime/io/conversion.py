@@ -15,19 +15,10 @@ from runtime.drives import Drives
 from runtime.errors import InputError
 from runtime.io.joint_states import JointTable
 from runtime.io.table import Named, Table
+from runtime.io.units import COMMANDS, position_unit, torque_unit
 from runtime.study import Columns, RecordSettings
 
 Array = np.ndarray
-
-POSITION = {
-    "rad": 1.0,
-    "deg": np.pi / 180,
-    "rev": 2 * np.pi,
-    "counts": 2 * np.pi,
-    "m": 1.0,
-    "mm": 1e-3,
-}  # to rad or m; counts per revolution apart
-COMMANDS = ("A", "V")  # units that a torque constant turns into torque
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,20 +128,21 @@ def _each(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
 
 def _position_units(settings: RecordSettings, n: int) -> Array:
     """Factors to rad or m, shape (n,)."""
-    units = _each(settings.units.q, n, "units.q")
+    units = [position_unit(unit) for unit in _each(settings.units.q, n, "units.q")]
     counts = _per_joint(1.0 if settings.counts_per_revolution is None else settings.counts_per_revolution, n, "counts_per_revolution")
-    return np.array([POSITION[unit] / (counts[j] if unit == "counts" else 1.0) for j, unit in enumerate(units)])
+    return np.array([factor / (counts[j] if kind == "counts" else 1.0) for j, (kind, factor) in enumerate(units)])
 
 
 def _torque_constant(settings: RecordSettings, drives: Drives | None, n: int) -> Array:
-    """Factors from the unit of tau to N m or N, shape (n,): a torque constant for A and V, 1 for a torque."""
-    units = _each(settings.units.tau, n, "units.tau")
-    if not any(unit in COMMANDS for unit in units):
-        return np.ones(n)
+    """Factors from the unit of tau to N m or N, shape (n,): that of the unit, times a torque constant for current and voltage."""
+    names = _each(settings.units.tau, n, "units.tau")
+    units = [torque_unit(name) for name in names]
+    if not any(kind in COMMANDS for kind, _ in units):
+        return np.array([factor for _, factor in units])
     if settings.torque_constant is not None:
         constant = _per_joint(settings.torque_constant, n, "torque_constant")
     elif drives is not None and settings.side == "motor":
         constant = drives.torque_constant
     else:
-        raise InputError(f"tau is in {', '.join(units)} but there is no torque constant; set record.torque_constant")
-    return np.array([constant[j] if unit in COMMANDS else 1.0 for j, unit in enumerate(units)])
+        raise InputError(f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; set record.torque_constant (N*m/A)")
+    return np.array([constant[j] * factor if kind in COMMANDS else factor for j, (kind, factor) in enumerate(units)])

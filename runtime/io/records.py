@@ -17,7 +17,8 @@ from runtime.drives import Drives
 from runtime.errors import InputError
 from runtime.io.conversion import column_names, conversion, finite_columns, reference_columns
 from runtime.io.table import Table, read_table
-from runtime.io.timing import SECONDS, clock
+from runtime.io.timing import clock
+from runtime.io.units import time_unit
 from runtime.model import GeneratedModel
 from runtime.record import Record
 from runtime.study import RecordSettings
@@ -89,5 +90,5 @@ def _time(settings: RecordSettings, table: Table, name: str | None, N: int) -> t
         if settings.rate is None:
             raise InputError("no time column and no rate; set record.rate (Hz) or record.columns.t", file=table.file)
         return np.arange(N) / settings.rate, settings.rate
-    t = finite_columns(table, [name])[:, 0] * SECONDS[settings.units.t]
+    t = finite_columns(table, [name])[:, 0] * time_unit(settings.units.t)
     return t, clock(settings, lambda: [table], name).rate

@@ -22,7 +22,8 @@ from runtime.io.conversion import Conversion, column_names, conversion, finite_c
 from runtime.io.files import sha256_of
 from runtime.io.records import file_hashes, read_records, record_files
 from runtime.io.table import BLOCK_READERS, BlockTable, open_table
-from runtime.io.timing import SECONDS, clock
+from runtime.io.timing import clock
+from runtime.io.units import time_unit
 from runtime.model import GeneratedModel
 from runtime.record import Record
 from runtime.record_stream import Stream
@@ -70,7 +71,7 @@ class FileStream:
                 yield np.arange(a, min(a + self.block, self.samples)) / self.rate
         else:
             for table in self.tables[0].blocks([self.columns.t], self.block):
-                yield finite_columns(table, [self.columns.t])[:, 0] * SECONDS[self.settings.units.t]
+                yield finite_columns(table, [self.columns.t])[:, 0] * time_unit(self.settings.units.t)
 
     def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
         """t (B,), q (B, n), tau (B, n), joint side, SI."""
@@ -83,7 +84,7 @@ class FileStream:
             if self.columns.t is None:
                 t = np.arange(a, a + len(q)) / self.rate
             else:
-                t = finite_columns(table, time)[:, 0] * SECONDS[self.settings.units.t]
+                t = finite_columns(table, time)[:, 0] * time_unit(self.settings.units.t)
             yield t, self.side.position(q), self.side.torque(tau)
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.io.conversion import finite_columns
 from runtime.io.table import Table
+from runtime.io.units import time_unit
 from runtime.study import RecordSettings
 
 Array = np.ndarray
 
-SECONDS = {"s": 1.0, "ms": 1e-3}
 RATE_TOLERANCE = 1e-3  # between the rate of the settings and that of the time column
 
 
@@ -80,6 +80,6 @@ def _times(settings: RecordSettings, tables: Iterable[Table], name: str) -> Iter
     """Table, time in s, and the steps that end in it, by block."""
     before: list[float] = []
     for table in tables:
-        t = finite_columns(table, [name])[:, 0] * SECONDS[settings.units.t]
+        t = finite_columns(table, [name])[:, 0] * time_unit(settings.units.t)
         yield table, t, np.diff(np.concatenate([before, t]))
         before = [float(t[-1])]
