@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from symgen.cli.session import fail, reported_errors
+from symgen.cli.snippet import with_estimate
 from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
@@ -31,6 +32,9 @@ def convert(
         Path | None,
         typer.Option(help="Standard parameters for OUT: a CSV of name,value, as standard_parameters.csv of a feasible estimate."),
     ] = None,
+    estimate: Annotated[
+        Path | None, typer.Option(help="The same from estimate.json of a feasible estimate (study: estimate: {method: feasible}).")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Write the robot IN in the format of OUT, and say what was read otherwise than written and what OUT does not carry.
@@ -47,6 +51,8 @@ def convert(
         robot, read = read_robot(source, constants=dict(map(_constant, constant or ())), nearly=snap)
         if values is not None:
             robot = replace(robot, values={**robot.values, **_values(values)})
+        if estimate is not None:
+            robot = with_estimate(robot, estimate)
         text, written = _text(robot, output, read)
         write_all(output.parent, {output.name: text})
         typer.echo(f"{output}: {robot.name}, {len(robot.joints)} joints, {len(robot.parameters)} standard parameters")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from textwrap import wrap
 
@@ -89,6 +90,11 @@ def render_xp(spec: ModuleSpec, *, command: str | None = None) -> str:
         "passive_rows": passive_rows(spec.robot),
     }
     return _environment().get_template("xp.py.jinja").render(context)
+
+
+def render_use(program: str, context: Mapping[str, object]) -> str:
+    """Text of the script that uses a robot in another program."""
+    return _environment().get_template(f"use_{program}.py.jinja").render(context)
 
 
 def _keywords(robot: Robot) -> dict[str, str]:
