@@ -27,6 +27,17 @@ PIPES = (  # Chromium reads commands on descriptor 3 and writes answers on 4
     "os.dup2(r, 3); os.dup2(w, 4); os.execvp(sys.argv[3], sys.argv[3:])"
 )
 
+WEAK_CONTRAST = """(() => {
+  const rgb = (c) => c.match(/[\\d.]+/g).map(Number);
+  const light = (c) => { const [r, g, b] = c.map((v) => v / 255).map((v) => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+  const ground = (n) => { for (; n; n = n.parentElement) { const c = rgb(getComputedStyle(n).backgroundColor); if (c[3] !== 0) return c.slice(0, 3); }
+    return [255, 255, 255]; };
+  return [...document.querySelectorAll('body *')].filter((n) => n.tagName !== 'SCRIPT' && [...n.childNodes].some((t) => t.nodeType === 3 && t.textContent.trim()))
+    .map((n) => { const style = getComputedStyle(n), svg = n.closest('svg'); const a = light(rgb(svg ? style.fill : style.color).slice(0, 3)), b = light(ground(n));
+      return [n.textContent.slice(0, 30), (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)]; }).filter(([, ratio]) => ratio < 4.5);
+})()"""  # texts with less than 4.5 to 1 (WCAG 2 AA) on their own background, as computed by the browser
+
 
 class BrowserError(Exception):
     """There is no browser, or it does not do what it is told."""
@@ -144,6 +155,11 @@ class Browser:
         self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x + dx, y=y + dy, button="left", buttons=1)
         self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x + dx, y=y + dy, button="left", clickCount=1)
 
+    def click(self, selector: str) -> None:
+        x, y = self.centre(selector)
+        for kind in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
     def press(self, key: str) -> None:
         """A key to whatever has the focus."""
         codes = {
@@ -157,7 +173,7 @@ class Browser:
             "Escape": 27,
             "Enter": 13,
         }
-        text = {"text": key} if len(key) == 1 else {}
+        text = {"text": key} if len(key) == 1 else {"text": "\r"} if key == "Enter" else {}
         self.call("Input.dispatchKeyEvent", type="keyDown", key=key, windowsVirtualKeyCode=codes.get(key, ord(key[0])), **text)
         self.call("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=codes.get(key, ord(key[0])))
 

@@ -1,0 +1,180 @@
+"""Parts of a report against what was not written for it: CAD values, extremes of long records, names, the judgement and its limits."""
+
+import base64
+import re
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from runtime.estimate import Estimate, JointFit
+from runtime.judgement import apart, graded, judge
+from runtime.model import load_model
+from runtime.report.markup import split, symbol, unit
+from runtime.report.parameters import cad_values, roles_of
+from runtime.report.residuals import decimation_cutoff
+from runtime.report.series import extremes, gaps, series
+from runtime.report.weak import correlations
+from runtime.study import Decimate, Signals
+from runtime.validation import JointComparison
+from symgen.report.symbols import symbol as other_symbol
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+ROBOTS = ("tx40", "haptic", "panda", "emps", "sr400")
+
+
+@pytest.fixture(scope="module")
+def models():
+    return {name: load_model(GENERATED / f"{name}.py") for name in ROBOTS}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_names_are_split_as_on_the_page_of_a_robot(models, name):
+    """The rule stands twice, since neither package may import the other."""
+    model = models[name]
+    for parameter in (*model.BASE_PARAMETERS, *model.STANDARD_PARAMETERS, *model.CONSTANTS):
+        assert split(parameter) == other_symbol(parameter)
+
+
+def test_words_are_no_names_with_an_index():
+    assert symbol("mass_1") == "<var>mass<sub>1</sub></var>" and symbol("left") == "<var>left</var>"
+    assert (unit("kg*m**2"), unit("N*m*s/rad")) == ("kg\u00a0m²", "N\u00a0m\u00a0s/rad")
+
+
+@pytest.mark.parametrize("name", ["tx40", "haptic", "emps"])
+def test_cad_values_are_those_of_the_emitted_formulas(models, name):
+    model = models[name]
+    expected = model.base_parameters(model.VALUES)
+    assert list(cad_values(model)) == list(model.BASE_PARAMETERS)
+    np.testing.assert_allclose(list(cad_values(model).values()), expected, rtol=1e-12, atol=1e-15)
+
+
+def test_cad_values_where_some_are_unknown(models):
+    """A base parameter has a CAD value where every standard parameter of its formula has one."""
+    model = models["tx40"]
+    part = SimpleNamespace(**vars(model))
+    part.VALUES = {n: v for n, v in model.VALUES.items() if n not in ("M5", "XY2")}
+    missing = {n for n, text in model.FORMULAS.items() if {"M5", "XY2"} & set(re.findall(r"\w+", text))}
+    assert set(cad_values(part)) == set(model.BASE_PARAMETERS) - missing and {"ZZ1R", "XY2"} <= missing
+    assert cad_values(models["panda"]) == {}
+
+
+@pytest.mark.parametrize("N", [5, 400, 401, 12345])
+def test_extremes_survive(N):
+    values = np.random.default_rng(N).normal(size=(3, N)).cumsum(axis=1)
+    kept = extremes(values, 400)
+    assert len(kept) <= 400 and kept[0] == 0 and kept[-1] == N - 1 and (np.diff(kept) > 0).all()
+    np.testing.assert_array_equal(values[:, kept].min(axis=1), values.min(axis=1))
+    np.testing.assert_array_equal(values[:, kept].max(axis=1), values.max(axis=1))
+    spike = values.copy()
+    spike[1, N // 3] = 1e6
+    assert N // 3 in extremes(spike, 400)
+
+
+def test_series_break_at_gaps_and_are_float32():
+    t = np.r_[np.arange(3000) * 1e-3, 5 + np.arange(3000) * 1e-3] + 1e6
+    joint = JointComparison("1", t, np.sin(t), np.zeros(6000))
+    found = series(joint, "N m", "measured", most=600)
+    assert list(gaps(t)) == [3000] and found.total == 6000 and np.isnan(found.t).sum() == 1
+    data = found.data
+    stored = np.frombuffer(base64.b64decode(data["t"]), "<f4") + data["start"]
+    finite = np.isfinite(found.t)
+    np.testing.assert_allclose(stored[finite], found.t[finite], atol=1e-5)  # s: float32 counts from the start
+    assert np.diff(found.t[finite]).min() > 0 and data["start"] == pytest.approx(1e6)
+
+
+def test_cut_off_of_the_decimation():
+    """0.8 of half the rate of the rows, as scipy's decimate."""
+    found = SimpleNamespace(study=SimpleNamespace(signals=Signals()), observation=SimpleNamespace(rate=125.0, settings={"factor": 40}))
+    assert decimation_cutoff(found) == 50.0
+    found.observation.settings = {"factor": 1}
+    assert decimation_cutoff(found) is None
+    found.study = SimpleNamespace(signals=replace(Signals(decimate=Decimate()), decimate=None))
+    assert decimation_cutoff(found) is None
+
+
+def fit(X=(1.0, 2.0), sigma=(0.01, 0.02), correlation=0.0, error=4.0, joints=(3.0, 5.0), **changed):
+    sigma = np.array(sigma)
+    covariance = np.outer(sigma, sigma) * np.array([[1, correlation], [correlation, 1]])
+    per_joint = tuple(JointFit(str(j + 1), 100, 1.0, e, 0.1) for j, e in enumerate(joints))
+    made = Estimate(("A1", "B1"), np.array(X), sigma, covariance, 2 * sigma, 0.1, 5.0, 3.0, 2, 1.0, error, per_joint, "ols")
+    return replace(made, **changed)
+
+
+def identified(estimate, unseen=5.0):
+    scatter = SimpleNamespace(names=estimate.names, drawn=2.5 * estimate.sigma)
+    prediction = SimpleNamespace(fitted=False, columns="essential", relative_error=unseen)
+    return SimpleNamespace(
+        every=estimate, carried=estimate, found=SimpleNamespace(estimate=estimate), validation=(SimpleNamespace(predictions=(prediction,)),),
+        trust=SimpleNamespace(scatter=scatter), verdict="2 of 2.",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("estimate", "unseen", "state", "question"), [
+    (fit(), 5.0, "good", None),
+    (fit(error=15.0), 15.0, "doubtful", "explain"),
+    (fit(error=25.0), 25.0, "no", "explain"),
+    (fit(joints=(3.0, 30.0)), 5.0, "doubtful", "every joint"),
+    (fit(), 9.0, "doubtful", "not seen"),
+    (fit(), 13.0, "no", "not seen"),
+    (fit(error=0.01, joints=(0.01,)), 1.9, "good", None),
+    (fit(sigma=(0.01, 0.3)), 5.0, "doubtful", "certain"),
+    (fit(sigma=(0.2, 0.3)), 5.0, "no", "certain"),
+    (fit(correlation=-0.95), 5.0, "doubtful", "told apart"),
+    (fit(cond_unit=300.0), 5.0, "doubtful", "determine"),
+    (fit(status="not-converged", message="after 20 steps."), 5.0, "no", "determine"),
+    (fit(status="rank-deficient", rank=1, groups=(("A1", "B1"),)), 5.0, "no", "determine"),
+])  # fmt: skip
+def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
+    judgement = judge(identified(estimate, unseen))
+    assert judgement.state == state
+    assert judgement.answer == {"good": "Yes", "doubtful": "With care", "no": "No"}[state]
+    if question is None:
+        assert judgement.worst is None and "not judged" in judgement.doubt
+    else:
+        assert (
+            question in judgement.worst.question and judgement.worst.found in judgement.doubt and judgement.worst.remedy in judgement.next
+        )
+    assert set(judgement.summary()) == {"state", "answer", "use", "doubt", "next", "checks"}
+
+
+def test_physical_consistency_counts():
+    found = identified(fit())
+    bad = SimpleNamespace(feasible=False, blocking=(("link 3", -0.01),), margin=-0.01)
+    judgement = judge(found, feasibility=bad)
+    assert judgement.state == "doubtful" and "link 3" in judgement.doubt and "feasible" in judgement.next
+    assert judge(found, feasibility=SimpleNamespace(feasible=True, blocking=(), margin=0.1)).state == "good"
+    assert judge(identified(fit(details={"standard": {}}))).state == "good"
+
+
+@pytest.mark.parametrize(("error", "state"), [(0.5, "good"), (3.0, "doubtful"), (8.0, "no")])
+def test_encoder_in_use_counts(error, state):
+    limits = [SimpleNamespace(percent=1.0, delta=1e-4), SimpleNamespace(percent=5.0, delta=2e-4)]
+    advice = SimpleNamespace(encoders=[SimpleNamespace(limits=limits)], unit="rad", asked=(1e-3,), worst=lambda k: ("A1", error))
+    assert judge(identified(fit()), advice=advice).state == state
+    advice.asked = ()
+    judgement = judge(identified(fit()), advice=advice)
+    assert judgement.state == "good" and judgement.checks[-1].state == "open" and "--encoder" in judgement.checks[-1].remedy
+
+
+def test_limits_are_inclusive():
+    assert [graded(x, 1.0, 5.0) for x in (1.0, 1.1, 5.0, 5.1)] == ["good", "doubtful", "doubtful", "no"]
+
+
+def test_correlations_by_name():
+    matrix = correlations(fit(correlation=-0.95))
+    assert matrix.cells == [[("+1.00", 4), ("−0.95", 4)], [("−0.95", 4), ("+1.00", 4)]]
+    assert correlations(fit(sigma=(0.0, 0.1))) is None
+    assert apart(fit(correlation=0.89)).state == "good"
+
+
+def test_roles_tell_the_order_of_removal():
+    steps = [SimpleNamespace(name=n, ratio=r, removed=x) for n, r, x in (("C1", 1.001, True), ("D1", 1.01, True), ("B1", 1.05, False))]
+    kept = SimpleNamespace(names=("A1", "B1"))
+    essential = SimpleNamespace(estimate=kept, names=kept.names, trail=steps)
+    found = SimpleNamespace(found=essential, carried=kept, every=SimpleNamespace(names=("A1", "B1", "C1", "D1")))
+    assert roles_of(found) == {
+        "A1": "essential", "B1": "essential, the next to go: ratio 1.0500", "C1": "removed no. 1, ratio 1.0010", "D1": "removed no. 2, ratio 1.0100",
+    }  # fmt: skip
