@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from typing import Protocol
 
 from runtime.errors import InputError
@@ -51,13 +50,3 @@ def unpacked(unpacker: Unpacker, data: bytes, limit: int) -> bytes:
         parts.append(part)
         size += len(part)
     return b"".join(parts)
-
-
-def inflated(data: bytes | memoryview, limit: int) -> int:
-    """Length of the content of a zlib stream, counted up to the first part beyond `limit`; nothing of it is kept."""
-    unpacker, size = zlib.decompressobj(), 0
-    tail: bytes | memoryview = data
-    while tail and size <= limit and not unpacker.eof:
-        size += len(unpacker.decompress(tail, PART))
-        tail = unpacker.unconsumed_tail
-    return size

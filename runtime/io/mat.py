@@ -1,4 +1,4 @@
-"""MATLAB files: up to version 7 by scipy, version 7.3 (an HDF5 file) by h5py, the only place where it is used (extra `tables`).
+"""MATLAB files: version 4 by scipy, 5 to 7 by `runtime.io.mat5`, 7.3 (an HDF5 file) by h5py, the only place where it is used (extra `tables`).
 
 Numeric and logical arrays are read. Cells, structures, texts and sparse matrices are listed with their class and never loaded: a column of one is
 refused by name. Arrays of version 7.3 are stored by columns, so that h5py shows them transposed; they are turned back.
@@ -18,11 +18,10 @@ from scipy.io.matlab import MatReadError
 
 from runtime.errors import InputError, first_line
 from runtime.io.arrays import ArrayTable, numeric
-from runtime.io.limits import allowed, inflated, require_size
+from runtime.io.limits import require_size
+from runtime.io.mat5 import read_mat5
 
 NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))  # classes of MATLAB
-HEADER = 128  # bytes ahead of the elements of a file of version 5 to 7
-COMPRESSED = 15  # type of an element that holds a zlib stream
 HDF5 = b"\x89HDF\r\n\x1a\n"
 DAMAGED = (
     *(MatReadError, OSError, EOFError, zlib.error, struct.error, MemoryError, RuntimeError),
@@ -35,28 +34,14 @@ def read_mat(data: bytes, file: str) -> ArrayTable:
     """Table of the bytes of a .mat file."""
     if any(data[place : place + len(HDF5)] == HDF5 for place in PLACES):
         return _read_hdf5(data, file)
+    if data[124:128] in (b"\x00\x01IM", b"\x01\x00MI") and 0 not in data[:4]:
+        return ArrayTable(file, *read_mat5(data, file))
     try:
-        _require_size(data, file)
-        classes = {name: kind for name, _, kind in scipy.io.whosmat(BytesIO(data))}
-        wanted = [name for name, kind in classes.items() if kind in NUMERIC]
-        arrays = numeric(scipy.io.loadmat(BytesIO(data), variable_names=wanted)) if wanted else {}
-    except InputError:
-        raise
+        if 0 not in data[:4]:
+            raise ValueError("its first 128 bytes are of no version")
+        return ArrayTable(file, numeric(scipy.io.loadmat(BytesIO(data))))  # version 4
     except DAMAGED as e:
         raise InputError(f"not a MATLAB file ({first_line(e)})", file=file) from e
-    return ArrayTable(file, arrays, {name: f"a MATLAB {kind}" for name, kind in classes.items() if name not in arrays})
-
-
-def _require_size(data: bytes, file: str) -> None:
-    """Raise InputError where the compressed elements of a file of version 7 unpack to more than a record holds."""
-    order = "<" if data[126:128] == b"IM" else ">"
-    place, total = HEADER, 0
-    while place + 8 <= len(data):
-        kind, size = struct.unpack_from(f"{order}II", data, place)
-        if kind == COMPRESSED:
-            total += inflated(memoryview(data)[place + 8 : place + 8 + size], allowed(len(data)) - total)
-            require_size(total, len(data), file)
-        place += 8 + size
 
 
 def _read_hdf5(data: bytes, file: str) -> ArrayTable:

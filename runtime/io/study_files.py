@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, TypeVar
-
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from typing import TypeVar
 
 from runtime.errors import InputError, SettingsError
 from runtime.io.datasets import DATASETS, dataset_study
+from runtime.io.files import require_file
 from runtime.io.table import KINDS, is_measured
-from runtime.io.yaml_text import yaml_values
+from runtime.io.yaml_text import LONGEST, yaml_values
 from runtime.mapping import structure
 from runtime.study import RecordSettings, Study, study_from_mapping
 
@@ -41,10 +40,14 @@ def load_study(path: Path) -> Study:
 
 def text_of(path: Path) -> str:
     """The text of a file of settings."""
+    if require_file(path) > 4 * LONGEST:  # bytes of so many characters
+        raise InputError(f"more than {4 * LONGEST} bytes; a file of settings has a few thousand", file=str(path))
     try:
         return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as e:
-        raise InputError(f"cannot be read: {e}", file=str(path)) from e
+    except UnicodeDecodeError as e:
+        raise InputError(f"byte {e.start} is not UTF-8; save the file as UTF-8", file=str(path)) from e
+    except OSError as e:
+        raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
 
 
 def study_from_text(text: str, *, file: str = "study") -> Study:
@@ -54,26 +57,9 @@ def study_from_text(text: str, *, file: str = "study") -> Study:
 
 def settings_from_text(kind: type[T], text: str, *, file: str) -> T:
     """The settings, a frozen dataclass, of a YAML text; raises SettingsError with file, line and key."""
-    values, tree = yaml_values(text, file=file)
+    values, lines = yaml_values(text, file=file)
     try:
         return structure(kind, {} if values is None else values)
     except SettingsError as e:
-        raise SettingsError(e.reason, path=e.path, file=file, line=_line(tree, e.path)) from None
-
-
-def _line(node: Any, path: tuple[str | int, ...]) -> int | None:
-    """Line, from 1, of the deepest key of the path that the file holds."""
-    line: int | None = None
-    for key in path:
-        if isinstance(node, CommentedMap):
-            found = next((k for k in node if str(k) == str(key)), None)
-            if found is None:
-                break
-            line = int(node.lc.key(found)[0]) + 1
-            node = node[found]
-        elif isinstance(node, CommentedSeq) and isinstance(key, int) and key < len(node):
-            line = int(node.lc.item(key)[0]) + 1
-            node = node[key]
-        else:
-            break
-    return line
+        known = (tuple(e.path[:k]) for k in range(len(e.path), 0, -1) if tuple(e.path[:k]) in lines)
+        raise SettingsError(e.reason, path=e.path, file=file, line=lines.get(next(known, ()))) from None

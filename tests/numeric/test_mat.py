@@ -82,6 +82,33 @@ def test_what_is_no_array_is_refused_by_name(name, said):
         assert f"column '{name}'" in str(e.value) and said.split()[-2 if "sparse" in name else -1] in str(e.value)
 
 
+@pytest.mark.parametrize("packed", [False, True])
+def test_versions_5_to_7_read_as_scipy_reads_them(packed):
+    """Every class of numbers, stored as it is or narrower, beside what is no array."""
+    rng = np.random.default_rng(1)
+    written = {
+        f"x{k}": (100 * rng.random((7, 3))).astype(kind)
+        for k, kind in enumerate(["d", "f", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "?"])
+    }
+    written |= {
+        "whole": np.arange(12.0),
+        "cube": rng.random((2, 3, 4)),
+        "none": np.empty((0, 3)),
+        "one": 2.5,
+        "a": 7,
+        "text": "abc",
+        "z": 1j * T,
+    }
+    stream = BytesIO()
+    scipy.io.savemat(stream, written, do_compression=packed, long_field_names=True)
+    table, expected = read_mat(stream.getvalue(), "a.mat"), scipy.io.loadmat(stream)
+    assert set(table.names) == set(written) - {"text", "z"} and set(table.others) == {"text", "z"}
+    for name in table.names:
+        np.testing.assert_array_equal(table.arrays[name], expected[name])
+    with pytest.raises(InputError, match="complex"):
+        table.stack(["z"])
+
+
 def test_links_are_not_followed(tmp_path):
     with h5py.File(tmp_path / "other.h5", "w") as other:
         other["x"] = T

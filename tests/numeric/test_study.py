@@ -116,7 +116,7 @@ def test_errors_give_the_path(mapping, path, said):
         ("record:\n- files: a\n- files: b\n  side: 3\n", 4, "record[1].side"),
         ("cestac:\n  delta:\n  - 1e-3\n  - 2*qi\n", 4, "cestac.delta[1]"),
         ("rows: {window: [0,\n", 2, "not YAML"),
-        ("rows: {trim: 1}\nrows: {trim: 2}\n", 2, "duplicate key"),
+        ("rows: {trim: 1}\nrows: {trim: 2}\n", 2, "given twice"),
         ("rows: 3", 1, "expected a mapping"),
     ],
 )
@@ -134,7 +134,7 @@ def test_other_content_is_refused(text):
 
 def test_an_alias_bomb_is_refused():
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"] + [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 9)]
-    with pytest.raises(InputError, match="100000 values"):
+    with pytest.raises(InputError, match="anchors and aliases"):
         study_from_text("\n".join(lines))
 
 
