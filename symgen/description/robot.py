@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
-from symgen.description.expression import ONE, ZERO, Expression
+from symgen.description.expression import ONE, ZERO, Call, Expression
 from symgen.description.forms import determinant, form_of, moves, row_of
 from symgen.errors import DescriptionError
 
@@ -297,9 +297,27 @@ def _declared(robot: Robot, e: Expression, path: Path, allowed: set[str] = froze
         )
 
 
+def _exact(e: Expression, path: Path, *, angle: bool = False) -> None:
+    """Refuse what exact arithmetic has no numbers for: pi outside an angle, functions inside one; a constant may have such a value."""
+    for a in e.atoms:
+        if isinstance(a, Call) and angle:
+            problem = f"{a} in an angle"
+        elif isinstance(a, Call):
+            _exact(a.argument, path, angle=a.function in ("cos", "sin"))
+            continue
+        elif a == "pi" and not angle:
+            problem = "pi outside an angle"
+        else:
+            continue
+        raise DescriptionError(
+            f"{'.'.join(str(key) for key in path)}: {problem}; declare a constant of that value and write its name", path=path
+        )
+
+
 def _check_geometry(robot: Robot) -> None:
     for k, component in enumerate(robot.gravity):
         _declared(robot, component, ("gravity", k))
+        _exact(component, ("gravity", k))
     for f in robot.frames:
         for name in ("gamma", "b", "alpha", "d", "theta", "r"):
             where = ("frames", f.j, name)
@@ -313,6 +331,7 @@ def _check_geometry(robot: Robot) -> None:
                     path=where,
                 )
             _declared(robot, e, where, {f.q} if variable else set())
+            _exact(e, where, angle=name in ("gamma", "alpha", "theta"))
 
 
 def _check_element(robot: Robot, e: Element) -> None:
@@ -346,6 +365,7 @@ def _check_element(robot: Robot, e: Element) -> None:
                             f"element {e.family}{j}: q{i} is not a joint of this robot (joints {list(robot.moving)})", path=place
                         )
                 _declared(robot, c, place)
+                _exact(c, place)
             if not any(coefficients.values()):
                 raise DescriptionError(f"element {e.family}{j}: zero along every joint", path=place)
 
