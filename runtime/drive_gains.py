@@ -185,7 +185,8 @@ def _gains(R: Array, D: Array) -> Array:
 
 def _column_deviations(rows: Sequence[int], scatter: Array, drives: Drives) -> Array:
     """Deviations of the errors of the columns of V with rows of joint j divided by s_j: s_j^2 = sum_m (R_mj sigma_m)^2."""
-    variance = nnls(drives.ratio.T**2, scatter**2)[0]
+    largest = (scatter**2).max()
+    variance = largest * nnls(drives.ratio.T**2, scatter**2 / largest)[0]  # scaled: nnls of SciPy 1.13 takes tiny values for zero
     weighted = (drives.ratio**2 * variance[:, None] / scatter**2) @ np.asarray(rows, dtype=float)
     return np.asarray(np.sqrt(np.maximum(weighted, 1e-6 * weighted.max())))
 

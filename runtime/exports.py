@@ -80,7 +80,7 @@ def npz(arrays: Mapping[str, Array]) -> bytes:
         if array.dtype.hasobject:
             raise TypeError(f"{name} holds Python objects; an archive holds numbers and texts")
     stream = BytesIO()
-    np.savez_compressed(stream, allow_pickle=False, **arrays)
+    np.savez_compressed(stream, **arrays)
     return stream.getvalue()
 
 
