@@ -28,6 +28,9 @@ def convert(
             min=0, max=0.1, help="Angles of a URDF this close (rad) to a multiple of pi/12 become that: 1e-4 reads 1.5708 as pi/2."
         ),
     ] = 0.0,
+    keep_fixed: Annotated[
+        bool, typer.Option("--keep-fixed", help="Of a URDF: links that fixed joints hold (tool0, flange) stay frames of their own.")
+    ] = False,
     values: Annotated[
         Path | None,
         typer.Option(help="Standard parameters for OUT: a CSV of name,value, as standard_parameters.csv of a feasible estimate."),
@@ -48,7 +51,7 @@ def convert(
             fail(f"{output} exists already; choose another name or add --force")
         from symgen.description import read_robot
 
-        robot, read = read_robot(source, constants=dict(map(_constant, constant or ())), nearly=snap)
+        robot, read = read_robot(source, constants=dict(map(_constant, constant or ())), nearly=snap, keep_fixed=keep_fixed)
         if values is not None:
             robot = replace(robot, values={**robot.values, **_values(values)})
         if estimate is not None:

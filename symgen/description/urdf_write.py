@@ -14,7 +14,7 @@ import numpy as np
 
 from symgen.description.expression import ONE, Expression
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, parameter
-from symgen.description.urdf_text import Array, turn
+from symgen.description.tree import Array, turn
 from symgen.errors import DescriptionError
 
 UNLIMITED = 1e9  # where a URDF asks for a limit that the robot does not have

@@ -92,6 +92,18 @@ def test_urdf_and_back(tmp_path):
     assert load_robot(again).values == pytest.approx(robot.values, abs=1e-12)
 
 
+def test_kept_frames_are_named(tmp_path):
+    """A flange stays a frame: its number in the report, its pose in the models."""
+    file, table = tmp_path / "arm.urdf", tmp_path / "arm.yaml"
+    flange = (
+        '<link name="tool0"/><joint name="f" type="fixed"><parent link="b"/><child link="tool0"/><origin xyz="0 0.3 0"/></joint></robot>'
+    )
+    file.write_text(ARM.replace("</robot>", flange))
+    result = run("convert", file, table, "--keep-fixed")
+    assert result.exit_code == 0 and "fixed frames: frame 3 = 'tool0'" in result.stdout
+    assert load_robot(table).frames == load_robot(file, keep_fixed=True).frames and len(load_robot(file).frames) == 2
+
+
 def test_values_of_an_estimate_go_into_the_urdf(tmp_path):
     file, csv = tmp_path / "arm.urdf", tmp_path / "standard_parameters.csv"
     file.write_text(ARM)

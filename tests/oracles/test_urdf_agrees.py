@@ -8,7 +8,11 @@ import pinocchio as pin
 import pytest
 
 from oracles.urdf_robots import NAMED, random_tree
+from symgen.derive.float_algebra import FloatAlgebra
+from symgen.derive.geometry import Geometry
+from symgen.derive.kinematics import frame_poses
 from symgen.derive.lagrange import Lagrange
+from symgen.derive.loops import close
 from symgen.description import Robot
 from symgen.description.robot import FIXED, PRISMATIC
 from symgen.description.urdf import read_urdf
@@ -21,6 +25,11 @@ TOLERANCE = 1e-10  # of the largest torque of the sample
 def legend(notes: tuple[str, ...]) -> dict[int, str]:
     """Joint names of the URDF by number."""
     return {int(j): name for j, name in re.findall(r"q(\d+) = '([^']*)'", notes[0])}
+
+
+def kept_frames(notes: tuple[str, ...]) -> dict[int, str]:
+    """Names of the links that are kept frames, by number."""
+    return {int(j): name for note in notes if note.startswith("fixed frames") for j, name in re.findall(r"frame (\d+) = '([^']*)'", note)}
 
 
 def loaded(robot: Robot) -> ModuleType:
@@ -36,12 +45,23 @@ class Pinocchio:
         self.model = pin.buildModelFromXML(text)
         self.data = self.model.createData()
 
+    def poses(self, names: list[str], q: np.ndarray, links: list[str]) -> np.ndarray:
+        """(4, 4) of each link in the root link's frame."""
+        pin.framesForwardKinematics(self.model, self.data, self.configuration(names, q))
+        return np.array([self.data.oMf[self.model.getFrameId(link, pin.FrameType.BODY)].homogeneous for link in links])
+
+    def configuration(self, names: list[str], q: np.ndarray) -> np.ndarray:
+        x = np.array(pin.neutral(self.model))
+        for k, name in enumerate(names):
+            joint = self.model.joints[self.model.getJointId(name)]
+            x[joint.idx_q : joint.idx_q + joint.nq] = [q[k]] if joint.nq == 1 else [np.cos(q[k]), np.sin(q[k])]
+        return x
+
     def torque(self, names: list[str], q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
         model = self.model
-        x, v, a = np.array(pin.neutral(model)), np.zeros(model.nv), np.zeros(model.nv)
+        x, v, a = self.configuration(names, q), np.zeros(model.nv), np.zeros(model.nv)
         for k, name in enumerate(names):
             joint = model.joints[model.getJointId(name)]
-            x[joint.idx_q : joint.idx_q + joint.nq] = [q[k]] if joint.nq == 1 else [np.cos(q[k]), np.sin(q[k])]
             v[joint.idx_v], a[joint.idx_v] = qd[k], qdd[k]
         tau = pin.rnea(model, self.data, x, v, a)
         return np.array([tau[model.joints[model.getJointId(name)].idx_v] for name in names])
@@ -99,3 +119,44 @@ def test_random_trees() -> None:
         assert difference(again, back, legend(notes), seed) < TOLERANCE, seed
         assert difference(again, robot, {j: f"q{j}" for j in robot.moving}, seed) < TOLERANCE, seed
     assert aside > 3  # nearly parallel axes took part
+
+
+def pose_difference(text: str, robot: Robot, notes: tuple[str, ...], seed: int) -> float:
+    """Largest difference (m, or of an entry of a rotation) of the poses of the kept frames; joints that follow others included."""
+    names, kept = legend(notes), kept_frames(notes)
+    oracle = Pinocchio(text)
+    largest = 0.0
+    for q in np.random.default_rng(seed).uniform(-1, 1, (3, len(robot.joints))) if kept else ():
+        position = {f"q{j}": x for j, x in zip(robot.joints, q, strict=True)}
+        position |= {f"q{j}": e.value(position) for j, e in robot.constraints.items()}
+        theirs = oracle.poses([names[j] for j in robot.moving], np.array([position[f"q{j}"] for j in robot.moving]), list(kept.values()))
+        poses = frame_poses(Geometry(robot, FloatAlgebra(robot, {j: np.array(position[f"q{j}"]) for j in robot.moving}), close(robot)))
+        ours = [np.column_stack([np.array(poses[j][0], dtype=float), np.array(poses[j][1], dtype=float)]) for j in kept]
+        largest = max(largest, float(np.abs(np.array(ours) - theirs[:, :3]).max()))
+    return largest
+
+
+@pytest.mark.parametrize("make", NAMED, ids=lambda make: make.__name__)
+def test_kept_frames_of_published_robots(make) -> None:
+    """tool0, hand, base mounts ...: poses equal pinocchio's, torques do not care, and the frames that move are the same."""
+    text = make()
+    merged, _ = read_urdf(text.encode(), "arm.urdf")
+    robot, notes = read_urdf(text.encode(), "arm.urdf", keep_fixed=True)
+    assert robot.frames[: len(merged.frames)] == merged.frames
+    assert len(kept_frames(notes)) == text.count('type="fixed"') == len(robot.frames) - len(merged.frames)
+    assert pose_difference(text, robot, notes, 4) < 1e-12
+    assert difference(text, robot, legend(notes), 1) < TOLERANCE
+    again, _ = write_urdf(robot)
+    assert difference(again, robot, {j: f"q{j}" for j in robot.moving}, 2) < TOLERANCE
+
+
+def test_kept_frames_of_random_trees() -> None:
+    kept = 0
+    for seed in range(40):
+        text = random_tree(seed)
+        if 'type="fixed"' in text:
+            robot, notes = read_urdf(text.encode(), "tree.urdf", keep_fixed=True)
+            kept += len(kept_frames(notes))
+            assert pose_difference(text, robot, notes, seed) < 1e-12, seed
+            assert difference(text, robot, legend(notes), seed) < TOLERANCE, seed
+    assert kept > 20

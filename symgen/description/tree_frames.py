@@ -1,0 +1,206 @@
+"""A tree of joints with any axes becomes a table of Khalil and Kleinfinger.
+
+Links joined by fixed joints are one body. Body j moves about or along z_j, the axis of its joint; x_i lies on the common normal of z_i and of the
+axis of the first joint that body i carries, so that this joint has gamma = b = 0; further branches have them. Parallel axes: the
+normal through the origin. Axes that are nearly parallel have no usable normal: a fixed frame without link turns in between. A joint position
+is that of the file, sign and zero included; frame 0 is the root link's. Where fixed joints are kept, each link that one holds is a fixed frame of its
+own, its link frame that of the file, after all that move: numbers of joints, and the table of what moves, are the same either way.
+
+Lengths become constants, equal ones (but for the sign) the same constant, so that the formulas know what is special about the robot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+
+from symgen.description.expression import PI, ZERO, Expression
+from symgen.description.robot import FIXED, PRISMATIC, REVOLUTE, Frame
+from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree, turn
+
+DIGITS = 13  # decimals kept of lengths (m) and angles (rad)
+SAME = 1e-12  # m, rad: closer is equal
+STEEP = 0.02  # sine of the angle of two axes below which their common normal is too far away to compute with
+
+
+@dataclass
+class Body:
+    """Body j while its frame is placed: links with their poses in it, joints it carries with the poses of their parent links."""
+
+    links: dict[str, Array]
+    joints: list[tuple[Joint, Array]]
+
+
+@dataclass
+class Table:
+    """The table as it grows: frames, values of the constants, joints and bodies by frame number, kept links by frame number."""
+
+    tree: Tree
+    frames: list[Frame] = field(default_factory=list)
+    constants: dict[str, float] = field(default_factory=dict)
+    joint: dict[int, Joint] = field(default_factory=dict)
+    bodies: dict[int, Body] = field(default_factory=dict)
+    kept: dict[int, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
+    """Frames of all bodies, a body before what it carries, branch by branch; then those of the links that fixed joints hold, if kept."""
+    table = Table(tree)
+    table.bodies[0] = _body(tree, tree.root, np.eye(4))
+    waiting = [(0, *carried) for carried in reversed(table.bodies[0].joints)]
+    while waiting:
+        ant, joint, parent = waiting.pop()
+        j = _add(table, ant, joint, parent)
+        waiting += [(j, *carried) for carried in reversed(table.bodies[j].joints)]
+    if keep_fixed:
+        for j, body in sorted(table.bodies.items()):
+            _, *held = body.links
+            for name in held:
+                _keep(table, j, name, body.links.pop(name))
+    return table
+
+
+def _keep(table: Table, ant: int, name: str, pose: Array) -> None:
+    """A fixed frame on `ant` that is the frame of link `name`, whose pose in `ant` is given."""
+    if _nearly_parallel(pose[:3, 2]):
+        to_aside, ant = _row(table, ant, FIXED, _normal(np.array([1.0, 0.0, 0.0]), pose[:3, 3]))
+        pose = np.linalg.inv(to_aside) @ pose
+    before = _numbered(_normal(pose[:3, 2], pose[:3, 3]))
+    rest = np.linalg.inv(_transform((*before, 0.0, 0.0))) @ pose
+    theta, r = _numbered((math.atan2(rest[1, 0], rest[0, 0]), rest[2, 3]))
+    found, j = _row(table, ant, FIXED, before, theta, r)
+    table.bodies[j] = Body({name: np.linalg.inv(found) @ pose}, [])
+    table.kept[j] = name
+
+
+def _body(tree: Tree, link: str, pose: Array) -> Body:
+    """The links that fixed joints hold on `link`, whose pose is given, and the joints they carry."""
+    body, waiting = Body({link: pose}, []), [link]
+    while waiting:
+        link = waiting.pop(0)
+        for joint in (joint for joint in tree.joints if joint.parent == link):
+            if joint.kind == FIXED_TYPE:
+                body.links[joint.child] = body.links[link] @ joint.pose
+                waiting.append(joint.child)
+            else:
+                body.joints.append((joint, body.links[link]))
+    order = {joint.name: k for k, joint in enumerate(tree.joints)}
+    body.joints.sort(key=lambda carried: order[carried[0].name])
+    return body
+
+
+def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
+    """Frame of `joint` on body `ant`, where its parent link has pose `parent`; returns its number."""
+    pose = parent @ joint.pose
+    axis, point = pose[:3, :3] @ joint.axis, pose[:3, 3]
+    if _nearly_parallel(axis):
+        angle = math.hypot(axis[0], axis[1])
+        table.notes.append(
+            f"axis of {joint.name!a:.60} is parallel to its antecedent's within {angle:.2g} rad; where parallel is meant, --snap 1e-4 rounds angles"
+        )
+        to_aside, aside = _row(table, ant, FIXED, _normal(np.array([1.0, 0.0, 0.0]), point))
+        pose = np.linalg.inv(to_aside) @ pose
+        axis, point, ant = pose[:3, :3] @ joint.axis, pose[:3, 3], aside
+    before = _numbered(_normal(axis, point))
+    body = _body(table.tree, joint.child, np.linalg.inv(_transform((*before, 0.0, 0.0))) @ pose)
+    theta = r = 0.0
+    if body.joints:
+        first, link = body.joints[0]
+        carried = link @ first.pose
+        along = carried[:3, :3] @ first.axis
+        if not _nearly_parallel(along):
+            theta, r, _, _ = _normal(along, carried[:3, 3])
+            theta, r = _numbered((theta, r))
+    sigma = PRISMATIC if joint.kind == "prismatic" else REVOLUTE
+    _, j = _row(table, ant, sigma, before, theta, r)
+    own = np.linalg.inv(_transform((0.0, 0.0, 0.0, 0.0, theta, r)))
+    table.bodies[j] = Body({name: own @ X for name, X in body.links.items()}, [(held, own @ X) for held, X in body.joints])
+    table.joint[j] = joint
+    return j
+
+
+def _nearly_parallel(axis: Array) -> bool:
+    """Whether the common normal of z and `axis` is too far away to compute with."""
+    return SAME < math.hypot(axis[0], axis[1]) < STEEP
+
+
+def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
+    """gamma, b, alpha, d to the line through `point` along `axis`, both in the frame before it; |gamma| <= pi/2."""
+    x, y, z = axis
+    s = math.hypot(x, y)
+    if s <= SAME:  # parallel
+        d = math.hypot(point[0], point[1])
+        gamma, b, alpha = (math.atan2(point[1], point[0]) if d > SAME else 0.0), 0.0, (0.0 if z > 0 else math.pi)
+    else:  # normal z_i x z_j
+        gamma, alpha = math.atan2(x, -y), math.atan2(s, z)
+        d = (-y * point[0] + x * point[1]) / s
+        b = point[2] - z * (x * point[0] + y * point[1]) / s**2
+    if abs(gamma) > math.pi / 2 + SAME:  # the same normal, x the other way
+        gamma, alpha, d = gamma - math.copysign(math.pi, gamma), -alpha, -d
+    return gamma, b, alpha, d
+
+
+def _transform(row: Sequence[float]) -> Array:
+    """Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), (4, 4)."""
+    gamma, b, alpha, d, theta, r = row
+    T = np.eye(4)
+    for axis, angle, shift in ((2, gamma, b), (0, alpha, d), (2, theta, r)):
+        step = np.eye(4)
+        step[:3, :3], step[axis, 3] = turn(axis, angle), shift
+        T = T @ step
+    return T
+
+
+def _numbered(row: Sequence[float]) -> tuple[float, ...]:
+    """The numbers as the table holds them: multiples of pi/12 exact, DIGITS decimals. Angles first, lengths second, in turn."""
+    return tuple(_angle(x)[0] if k % 2 == 0 else round(x, DIGITS) + 0.0 for k, x in enumerate(row))
+
+
+def _angle(x: float) -> tuple[float, Expression]:
+    turns = round(x * 12 / math.pi)
+    if abs(x - turns * math.pi / 12) <= SAME:
+        return turns * math.pi / 12, PI * Fraction(turns, 12)
+    return round(x, DIGITS), _exact(round(x, DIGITS))
+
+
+def _exact(x: float) -> Expression:
+    return Expression.number(Fraction(repr(x)))
+
+
+def _row(table: Table, ant: int, sigma: int, before: Sequence[float], theta: float = 0.0, r: float = 0.0) -> tuple[Array, int]:
+    """Append a frame; returns its pose at q = 0 in its antecedent and its number."""
+    j = len(table.frames) + 1
+    gamma, b, alpha, d = before = _numbered(before)
+    q = Expression.symbol(f"q{j}")
+    turned, moved = _angle(theta)[1], _length(table, f"RL{j}", r)
+    table.frames.append(
+        Frame(
+            j,
+            ant,
+            sigma,
+            int(sigma != FIXED),
+            gamma=_angle(gamma)[1],
+            b=_length(table, f"B{j}", b),
+            alpha=_angle(alpha)[1],
+            d=_length(table, f"D{j}", d),
+            theta=turned + q if sigma == REVOLUTE else turned,
+            r=moved + q if sigma == PRISMATIC else moved,
+        )
+    )
+    return _transform((*before, theta, r)), j
+
+
+def _length(table: Table, name: str, x: float) -> Expression:
+    """0, or a constant of this value, the one that is there already if it is equal."""
+    if abs(x) <= SAME:
+        return ZERO
+    known = next((k for k, value in table.constants.items() if abs(abs(value) - abs(x)) <= SAME), None)
+    if known is None:
+        table.constants[name] = abs(x)
+        known = name
+    return Expression.symbol(known) * (1 if x > 0 else -1)

@@ -1,0 +1,168 @@
+"""The Robot of a tree: its Khalil frames, its joints as elements and limits, its inertials as standard parameters.
+
+With pose jX of a link in frame j, centre of mass c and rotation R = jR of the inertia I of the file:
+
+    M,    MS = M c,    J = R I R' + M (c'c 1 - c c')        tensor elements about the origin of frame j, summed over the links of a body
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Callable
+from fractions import Fraction
+
+import numpy as np
+
+from symgen.description.expression import ONE, ZERO, Expression
+from symgen.description.robot import FIXED, INERTIAL, Element, Frame, Robot, parameter
+from symgen.description.tree import Joint, Tree
+from symgen.description.tree_frames import Body, Table, placed
+from symgen.errors import DescriptionError
+
+FAMILIES: tuple[tuple[str, str, Callable[[Joint], float]], ...] = (  # family, kind, value of a joint
+    ("Ia", "inertia", lambda joint: joint.armature),
+    ("FV", "viscous", lambda joint: joint.damping),
+    ("FS", "coulomb", lambda joint: joint.friction),
+    ("OFFSET", "offset", lambda joint: -joint.stiffness * joint.rest + 0.0),
+    ("K", "stiffness", lambda joint: joint.stiffness),
+)
+
+
+def robot_of_tree(tree: Tree, file: str, sha256: str, *, keep_fixed: bool = False) -> tuple[Robot, tuple[str, ...]]:
+    """The robot, and notes: which joint is which q, which link is which kept frame, and what was not read.
+
+    Raises DescriptionError, with the line of the joint at fault, where the tree is no robot.
+    """
+    table = placed(tree, keep_fixed=keep_fixed)
+    try:
+        robot = _robot(table, file, sha256)
+    except DescriptionError as error:
+        joint = table.joint.get(int(str(error.path[1]))) if len(error.path) > 1 and error.line is None else None
+        raise DescriptionError(error.message, path=error.path, line=error.line or (joint.line if joint else 1)) from error.__cause__
+    legends = [_legend("joints", {f"q{j}": joint.name for j, joint in table.joint.items()})]
+    if table.kept:
+        legends.append(_legend("fixed frames", {f"frame {j}": name for j, name in table.kept.items()}))
+    return robot, (*legends, *tree.notes, *table.notes)
+
+
+def _legend(what: str, names: dict[str, str]) -> str:
+    return f"{what}: " + ", ".join(f"{here} = {there!a:.60}" for here, there in names.items())
+
+
+def _robot(table: Table, file: str, sha256: str) -> Robot:
+    constraints = _constraints(table)
+    actuated = [j for j in table.joint if j not in constraints]
+    if not actuated:
+        raise DescriptionError("no joint that moves; a robot has at least one")
+    frames = tuple(Frame(**{**vars(f), "mu": int(f.j in actuated)}) for f in table.frames)
+    values, massless = _values(table, actuated)
+    gravity, constants = _gravity(table.tree.gravity)
+    return Robot(
+        name=_identifier(table.tree.name or file.rpartition(".")[0]),
+        frames=frames,
+        gravity=gravity,
+        constants={**table.constants, **constants},
+        elements=tuple(
+            Element(family, kind, {j: {j: ONE} for j in keys}, {})
+            for family, kind, _ in FAMILIES
+            if (keys := _keys(table, family, actuated))
+        ),
+        constraints=constraints,
+        massless=massless,
+        limits=_limits(table, actuated),
+        values=values,
+        file=file,
+        sha256=sha256,
+    )
+
+
+def _identifier(name: str) -> str:
+    name = re.sub(r"\W", "_", name, flags=re.ASCII)[:34] or "robot"
+    return f"robot_{name}" if not name[0].isalpha() or keyword.iskeyword(name) else name
+
+
+def _gravity(g: tuple[float, float, float]) -> tuple[tuple[Expression, Expression, Expression], dict[str, float]]:
+    """Gravity by constants: g where it points along -z, else one for each component that is not zero."""
+    if g[:2] == (0.0, 0.0) and g[2] < 0:
+        return (ZERO, ZERO, -Expression.symbol("g")), {"g": -g[2]}
+    names = [f"g{axis}" if x else "" for axis, x in zip("xyz", g, strict=True)]
+    gx, gy, gz = (Expression.symbol(name) if name else ZERO for name in names)
+    return (gx, gy, gz), {name: x for name, x in zip(names, g, strict=True) if name}
+
+
+def _constraints(table: Table) -> dict[int, Expression]:
+    """q_j of the joints that follow others."""
+    number = {joint.name: j for j, joint in table.joint.items()}
+    found: dict[int, Expression] = {}
+    for name, relation in table.tree.relations.items():
+        found[number[name]] = sum(
+            (Expression.symbol(f"q{number[leader]}") * factor for leader, factor in relation.leaders.items()),
+            start=Expression.number(Fraction(relation.offset)),
+        )
+    return dict(sorted(found.items()))
+
+
+def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
+    """Joints with a parameter of the family: the actuated ones, and those that follow where the file gives a value; springs only so."""
+    value = next(value for name, _, value in FAMILIES if name == family)
+    return [j for j, joint in table.joint.items() if value(joint) or (j in actuated and family != "K")]
+
+
+def _limits(table: Table, actuated: list[int]) -> dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]]:
+    """Limits that every actuated joint has; a kind that one joint lacks is left out and noted."""
+    rows = [table.joint[j] for j in actuated]
+    found: dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = {}
+    bounds = tuple((joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)) for joint in rows)
+    if all(low < high for low, high in bounds) and all(joint.kind != "continuous" for joint in rows):
+        found["q"] = bounds
+    for here, there in (("qd", "velocity"), ("tau", "effort")):
+        largest = tuple(joint.limits.get(there, 0.0) for joint in rows)
+        if all(x > 0 for x in largest):
+            found[here] = largest
+    if missing := [key for key in ("q", "qd", "tau") if key not in found]:
+        table.notes.append(f"limits of {', '.join(missing)} left out: not every actuated joint has them")
+    return found
+
+
+def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozenset[int]]:
+    """Standard parameters by name, empty where no link has inertia, and the fixed frames without mass."""
+    links = table.tree.links
+    frames = {f.j: f for f in table.frames}
+    bodies = {j: body for j, body in table.bodies.items() if j in table.joint or (j in table.kept and _carried(table, j))}
+    heavy = {j for j, body in bodies.items() if any(links[name] is not None for name in body.links)}
+    massless = frozenset(j for j in frames if frames[j].sigma == FIXED and j not in heavy)
+    if not heavy:
+        table.notes.append("no link has an <inertial>: the robot has no values")
+        return {}, massless
+    values: dict[str, float] = {}
+    for j, body in bodies.items():
+        if j in massless:
+            continue
+        if j not in heavy:
+            table.notes.append(f"no <inertial> on {', '.join(f'{name!a:.60}' for name in body.links)}: values of link {j} are 0")
+        values |= {parameter(p, j): x for p, x in zip(INERTIAL, _standard(table, body), strict=True)}
+    for family, _, value in FAMILIES:
+        values |= {parameter(family, j): value(table.joint[j]) for j in _keys(table, family, actuated)}
+    return values, massless
+
+
+def _carried(table: Table, j: int) -> bool:
+    """Whether a joint carries frame j."""
+    ant = {f.j: f.ant for f in table.frames}
+    while j and j not in table.joint:
+        j = ant[j]
+    return j > 0
+
+
+def _standard(table: Table, body: Body) -> tuple[float, ...]:
+    """XX XY XZ YY YZ ZZ MX MY MZ M of a body in its frame."""
+    M, MS, J = 0.0, np.zeros(3), np.zeros((3, 3))
+    for name, X in body.links.items():
+        inertial = table.tree.links[name]
+        if inertial is not None:
+            own = X @ inertial.pose
+            R, c = own[:3, :3], own[:3, 3]
+            M, MS = M + inertial.M, MS + inertial.M * c
+            J = J + R @ inertial.I @ R.T + inertial.M * (c @ c * np.eye(3) - np.outer(c, c))
+    return (*(float(x) for x in J[np.triu_indices(3)]), *(float(x) for x in MS), M)
