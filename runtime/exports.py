@@ -13,6 +13,7 @@ import csv
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO, StringIO
+from typing import Any
 
 import numpy as np
 import scipy.io
@@ -79,6 +80,7 @@ def npz(arrays: Mapping[str, Array]) -> bytes:
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise TypeError(f"{name} holds Python objects; an archive holds numbers and texts")
+    content: dict[str, Any] = dict(arrays)
     stream = BytesIO()
     np.savez_compressed(stream, **arrays)
     return stream.getvalue()
