@@ -82,7 +82,7 @@ def npz(arrays: Mapping[str, Array]) -> bytes:
             raise TypeError(f"{name} holds Python objects; an archive holds numbers and texts")
     content: dict[str, Any] = dict(arrays)
     stream = BytesIO()
-    np.savez_compressed(stream, **arrays)
+    np.savez_compressed(stream, **content)
     return stream.getvalue()
 
 
