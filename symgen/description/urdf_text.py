@@ -6,12 +6,13 @@ A URDF library would load them, and its XML parser expands entities (`xml_text` 
 from __future__ import annotations
 
 import math
+import sys
 from fractions import Fraction
 
 import numpy as np
 
 from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, MOVING, Inertial, Joint, Relation, Tree, turn
-from symgen.description.xml_text import MAX_BYTES, Array, Element, read_elements
+from symgen.description.xml_text import LARGEST, MAX_BYTES, Array, Element, read_elements
 from symgen.errors import DescriptionError
 
 __all__ = ["MAX_BYTES", "parse_urdf"]
@@ -40,7 +41,9 @@ def parse_urdf(content: bytes, nearly: float = 0.0) -> Tree:
         raise DescriptionError(f"{len(joints)} joints; at most {MAX_JOINTS} are read", line=root.line)
     base = _root(links, joints, root.line)
     other = sorted({e.tag for e in root.children} - {"link", "joint", "material"})
-    notes = (f"not read: {', '.join(f'<{tag}>' for tag in other)}",) if other else ()
+    notes: tuple[str, ...] = (f"not read: {', '.join(f'<{tag}>' for tag in other)}",) if other else ()
+    points = [e.text("name") for e in root.children if e.tag == "link" and (own := e.first("inertial")) and own.first("inertia") is None]
+    notes += (f"no <inertia>, taken as point masses: {', '.join(f'{name!a:.60}' for name in points)}",) if points else ()
     return Tree(root.attributes.get("name", ""), links, tuple(joints), base, _relations(joints, mimics), notes=notes)
 
 
@@ -84,11 +87,13 @@ def _inertial(link: Element, nearly: float) -> Inertial | None:
     if e is None:
         return None
     mass, inertia = e.first("mass"), e.first("inertia")
-    if mass is None or inertia is None:
-        raise DescriptionError("<inertial> needs <mass> and <inertia>", line=e.line)
+    if mass is None:
+        raise DescriptionError("<inertial> needs <mass>", line=e.line)
     M = mass.number("value")
     if M < 0:
         raise DescriptionError(f"mass {M}; expected 0 or more", line=mass.line)
+    if inertia is None:  # a point mass: programs that read URDF say so and go on
+        return Inertial(M, _pose(e.first("origin"), nearly), np.zeros((3, 3)))
     xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     return Inertial(M, _pose(e.first("origin"), nearly), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
@@ -109,7 +114,8 @@ def _joint(e: Element, nearly: float) -> Joint:
         raise DescriptionError(f"joint {name!r}: axis {axis.tolist()} has no direction", line=(given or e).line)
     limit, dynamics = e.first("limit"), e.first("dynamics")
     keys = ("lower", "upper", "velocity", "effort")
-    limits: dict[str, float] = {str(key): limit.number(key) for key in keys if key in limit.attributes} if limit is not None else {}
+    bounds = {key: limit.number(key, largest=sys.float_info.max) for key in keys if key in limit.attributes} if limit is not None else {}
+    limits = {key: x for key, x in bounds.items() if abs(x) <= LARGEST}  # some files say 1e16 for none
     damping, friction = (0.0 if dynamics is None else dynamics.number(key, "0") for key in ("damping", "friction"))
     axis = axis if abs(length - 1) < 1e-15 else axis / length
     return Joint(name, kind, ends["parent"].text("link"), ends["child"].text("link"), _pose(e.first("origin"), nearly), axis, e.line,

@@ -57,9 +57,9 @@ def _link(robot: Robot, j: int, values: Mapping[str, float]) -> list[str]:
     if not any(standard):
         return [f'  <link name="link{j}"/>']
     *J, mx, my, mz, M = standard
-    if M <= 0:
+    if M < 0 or (M == 0 and (mx, my, mz) != (0, 0, 0)):
         raise DescriptionError(f"{robot.name}: M{j} = {M} with other moments; no mass has these. Export a physically feasible estimate")
-    c = np.array([mx, my, mz]) / M
+    c = np.array([mx, my, mz]) / M if M else np.zeros(3)
     I = np.zeros((3, 3))
     I[np.triu_indices(3)] = J
     I -= M * (c @ c * np.eye(3) - np.outer(c, c))

@@ -35,7 +35,7 @@ class Element:
             raise DescriptionError(f"<{self.tag}> has no {name}; add it", line=self.line)
         return value
 
-    def numbers(self, name: str, n: int, default: str | None = None) -> Array:
+    def numbers(self, name: str, n: int, default: str | None = None, largest: float = LARGEST) -> Array:
         """n finite numbers of an attribute."""
         text = self.text(name, default)
         words = text.split()
@@ -43,15 +43,15 @@ class Element:
             values = [float(word) for word in words]
         except ValueError:
             values = []
-        if len(words) != n or len(values) != n or not all(abs(x) <= LARGEST for x in values):
+        if len(words) != n or len(values) != n or not all(abs(x) <= largest for x in values):
             raise DescriptionError(
-                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of size at most {LARGEST:g}", line=self.line
+                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of size at most {largest:g}", line=self.line
             )
         return np.array(values)
 
-    def number(self, name: str, default: str | None = None) -> float:
+    def number(self, name: str, default: str | None = None, largest: float = LARGEST) -> float:
         """One finite number of an attribute."""
-        return float(self.numbers(name, 1, default)[0])
+        return float(self.numbers(name, 1, default, largest)[0])
 
 
 def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> Element:

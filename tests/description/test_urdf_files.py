@@ -51,7 +51,7 @@ WRONG = [
     ('xyz="0 0 2"', 'xyz="0 2"', 6, "expected 3 numbers"),
     ('xyz="0 0 2"', 'xyz="0 0 nan"', 6, "expected 3 numbers"),
     ('xyz="0 0 2"', 'xyz="0 0 1e999"', 6, "expected 3 numbers"),
-    ('<mass value="2"/>', "", 3, "<mass> and <inertia>"),
+    ('<mass value="2"/>', "", 3, "needs <mass>"),
     ('value="2"', 'value="-2"', 3, "0 or more"),
     ('<child link="b"/>', '<child link="z"/>', 7, "no link 'z'"),
     ('<child link="b"/>', '<child link="a"/>', 7, "has a parent already"),
@@ -70,6 +70,16 @@ def test_faults_are_errors_with_their_line(old, new, line, words):
     assert old in ARM
     error = error_of(ARM.replace(old, new, 1))
     assert words in error.message and error.line == line
+
+
+def test_what_makers_leave_out():
+    """Limits that mean none, an inertia not given, the axis of a fixed joint: as files of makers have them."""
+    text = ARM.replace('<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>', '<origin xyz="0.5 0 0"/>')
+    text = text.replace('<axis xyz="0 0 2"/>', '<axis xyz="0 0 2"/><limit lower="-1e16" upper="1e16" velocity="1" effort="1"/>')
+    text = text.replace('<link name="b"/>', '<link name="b"/><link name="c"/>')
+    fixed = '<joint name="f" type="fixed"><parent link="b"/><child link="c"/><axis xyz="0 0 0"/></joint></robot>'
+    robot, notes = read_urdf(text.replace("</robot>", fixed).encode(), "arm.urdf")
+    assert robot.values["ZZ1"] == 2 * 0.5**2 and "point masses: 'a'" in " ".join(notes) and "q" not in robot.limits
 
 
 BOMB = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "' + "&a;" * 50 + '"><!ENTITY c "' + "&b;" * 50 + '">]>'
