@@ -13,6 +13,7 @@ from typing import Any
 
 from runtime.errors import InputError, first_line
 from runtime.io.arrays import ArrayBlock, ArrayTable
+from runtime.io.limits import require_size
 from runtime.io.naming import check_names
 
 READ = 2**18  # rows read at a time: about one row group of the usual writers
@@ -23,8 +24,11 @@ def read_parquet(data: bytes, file: str) -> ArrayTable:
     """Table of the numeric columns of the bytes of a Parquet file; missing values become nan."""
     polars = _polars(file)
     with _refused(polars, file):
-        frame = polars.read_parquet(BytesIO(data))
-        names = _numeric(polars, frame.schema)
+        lazy = polars.scan_parquet(BytesIO(data))
+        names = _numeric(polars, lazy.collect_schema())
+        rows = int(lazy.select(polars.len()).collect().item())
+        require_size(8 * rows * len(names), len(data), file)  # a constant column of any length takes no space in the file
+        frame = polars.read_parquet(BytesIO(data), columns=names)
         return ArrayTable(file, {name: frame[name].cast(polars.Float64).to_numpy() for name in names})
 
 

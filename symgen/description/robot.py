@@ -204,10 +204,13 @@ def parameter(family: str, j: int) -> str:
 # --- checks -----------------------------------------------------------------------------------------------------------
 
 ARGUMENTS = {"q", "qd", "qdd", "tau", "X", "D", "out", "frame", "standard", "np", "pi", "N", "B", "A"}
+RESERVED = {"CON", "PRN", "AUX", "NUL", *(f"{device}{k}" for device in ("COM", "LPT") for k in range(10))}
 
 
 def _check(robot: Robot) -> None:
     check_identifier(robot.name, ("name",))
+    if robot.name.upper() in RESERVED:
+        raise DescriptionError(f"{robot.name!r} names a device on Windows, where no file can be called so; choose another", path=("name",))
     for name in ("title", "source", "file"):
         _check_text(getattr(robot, name), name)
     _check_tree(robot)
