@@ -7,6 +7,7 @@ import inspect
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -19,7 +20,7 @@ from runtime.study import Study, to_mapping
 from symgen.cli.main import VERBS, app
 from symgen.description import load_robot, packaged_robots
 from symgen.description.schema import json_schema
-from symgen.regroup.regrouping import regroup
+from symgen.regroup.regrouping import Regrouping, regroup
 
 HERE = Path(__file__).resolve().parent.parent
 HOMES = {"regroup": "symgen.regroup.regrouping"}  # a package has this public name, too
@@ -223,13 +224,19 @@ def names(package: str) -> str:
 # Robots and examples
 
 
+@cache
+def regrouped(name: str) -> Regrouping:
+    """Base parameters of a packaged robot, derived once for the gallery's list and its pages."""
+    return regroup(load_robot(name))
+
+
 def robots() -> str:
     """Every packaged robot: title, counts, a link to its page, its source, its longest formulas."""
     return "\n".join(robot(name) for name in packaged_robots())
 
 
 def robot(name: str) -> str:
-    regrouping = regroup(load_robot(name))
+    regrouping = regrouped(name)
     description = regrouping.robot
     gathered = [b for b in regrouping.base if b.name != b.own]
     formulas = "\n".join(f"{b.name} = {b.formula}" for b in gathered[:3])

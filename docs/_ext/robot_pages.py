@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from reference import regrouped
 from sphinx.application import Sphinx
 
-from symgen.description import load_robot, packaged_robots
-from symgen.regroup.regrouping import regroup
+from symgen.description import packaged_robots
 from symgen.report.page import robot_page
 
 
@@ -16,7 +16,7 @@ def write_pages(app: Sphinx, failure: Exception | None) -> None:
         folder = Path(app.outdir) / "robots"
         folder.mkdir(exist_ok=True)
         for name in packaged_robots():
-            (folder / f"{name}.html").write_text(robot_page(regroup(load_robot(name))), encoding="utf-8")
+            (folder / f"{name}.html").write_text(robot_page(regrouped(name)), encoding="utf-8")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -1,0 +1,138 @@
+"""The documentation builds without a warning, is complete, links to what exists, and asks nobody for anything."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import os
+import pkgutil
+import re
+import subprocess
+import sys
+from dataclasses import fields
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from browser import Browser, BrowserError, find_browser
+
+import runtime
+import symgen
+from runtime.study import Study
+from symgen.cli.main import VERBS
+from symgen.description import packaged_robots
+
+pytest.importorskip("sphinx", reason="needs the extra docs")
+
+ROOT = Path(__file__).resolve().parents[2]
+SHOWN = ("index.html", "guide/my_robot.html", "theory/cestac.html", "reference/gallery.html", "reference/study_file.html", "api/index.html")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built with warnings as errors."""
+    out = tmp_path_factory.mktemp("site")
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "--keep-going",
+        "-n",
+        "-q",
+        "-d",
+        str(out / "trees"),
+        str(ROOT / "docs"),
+        str(out / "html"),
+    ]
+    built = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    assert built.returncode == 0, built.stderr[-4000:]
+    return out / "html"
+
+
+class Addresses(HTMLParser):
+    """Addresses a page fetches by itself, those it links to, and its anchors."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.fetched: list[str] = []
+        self.linked: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        if given.get("id"):
+            self.anchors.add(str(given["id"]))
+        if tag == "a" and given.get("href"):
+            self.linked.append(str(given["href"]))
+        elif tag == "link" and given.get("href"):
+            self.fetched.append(str(given["href"]))
+        elif given.get("src"):
+            self.fetched.append(str(given["src"]))
+
+
+def test_site_builds_links_and_fetches_nothing(site: Path) -> None:
+    pages = {page: Addresses(page.read_text(encoding="utf-8")) for page in site.rglob("*.html")}
+    assert {f"{name}.html" for name in packaged_robots()} == {page.name for page in (site / "robots").iterdir()}
+    for page, addresses in pages.items():
+        away = [address for address in addresses.fetched if urlsplit(address).scheme or address.startswith("//")]
+        assert all(address.startswith("data:") for address in away), f"{page.name} fetches {away}"
+        for address in {*addresses.fetched, *addresses.linked}:
+            parts = urlsplit(address)
+            if parts.scheme:
+                continue
+            target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
+            assert target.exists(), f"{page.relative_to(site)} links to {address}"
+            if parts.fragment and target in pages and "robots" not in target.parts:
+                assert unquote(parts.fragment) in pages[target].anchors | {""}, f"{page.relative_to(site)} links to {address}"
+
+
+def test_every_public_function_and_class_is_described(site: Path) -> None:
+    from sphinx.util.inventory import InventoryFile
+
+    with (site / "objects.inv").open("rb") as file:
+        known = {name for kind, names in InventoryFile.load(file, "", lambda base, address: address).items() for name in names}
+    for package in (symgen, runtime):
+        for found in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+            if found.name.startswith("symgen.cli"):
+                continue
+            module = importlib.import_module(found.name)
+            public = getattr(module, "__all__", [name for name in vars(module) if not name.startswith("_")])
+            for name in public:
+                value = getattr(module, name)
+                written_here = getattr(value, "__module__", None) == found.name and getattr(value, "__name__", None) == name
+                if written_here and (inspect.isfunction(value) or inspect.isclass(value)):
+                    assert f"{found.name}.{name}" in known, f"{found.name}.{name} is on no page of docs/api"
+
+
+def test_references_hold_every_verb_and_every_section(site: Path) -> None:
+    commands = (site / "reference" / "commands.html").read_text(encoding="utf-8")
+    study = (site / "reference" / "study_file.html").read_text(encoding="utf-8")
+    for verb in VERBS:
+        assert f"symgen {verb}" in commands
+    for field in fields(Study):
+        assert re.search(rf">{field.name}<", study), field.name
+    assert "<!-- generated" not in commands + study
+
+
+def test_pages_in_a_browser_ask_for_files_of_the_site_alone(site: Path) -> None:
+    try:
+        executable = find_browser()
+    except BrowserError as e:
+        if os.environ.get("SYMGEN_REQUIRE_BROWSER") == "1":
+            pytest.fail(f"SYMGEN_REQUIRE_BROWSER=1 but {e}")
+        pytest.skip(f"{e}; install chromium to run the tests in a browser")
+    with Browser(executable) as browser:
+        for name in SHOWN:
+            for width in (1280, 390):
+                browser.open(site / name, width, 800)
+                assert not browser.complaints, (name, browser.complaints)
+                foreign = [r for r in browser.requests if not r.startswith((site.as_uri(), "data:"))]
+                assert not foreign, (name, foreign)
+                assert browser.run("document.documentElement.scrollWidth <= window.innerWidth"), f"{name} is wider than {width}"
+        browser.open(site / "theory" / "cestac.html")
+        sizes = browser.run("[...document.querySelectorAll('math')].map(m => m.getBoundingClientRect().height)")
+        assert len(sizes) > 10
+        assert min(sizes) > 5
