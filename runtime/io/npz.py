@@ -53,8 +53,7 @@ def archive_of(data: bytes, file: str) -> dict[str, Array]:
         with zipfile.ZipFile(BytesIO(data)) as packed:
             members = packed.infolist()
             require_size(sum(member.file_size for member in members), len(data), file)
-            if len(members) > WIDEST:
-                raise InputError(f"{len(members)} arrays; at most {WIDEST} are read", file=file)
+            _require_distinct([member.filename for member in members], file)
         with np.load(BytesIO(data), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except InputError:
@@ -74,6 +73,14 @@ def read_npy(data: bytes, file: str) -> ArrayTable:
     _require_columns(x.shape, x.dtype, file)
     columns = x.reshape(len(x), -1)
     return ArrayTable(file, {str(i + 1): columns[:, i] for i in range(columns.shape[1])})
+
+
+def _require_distinct(members: list[str], file: str) -> None:
+    """x and x.npy are the same array to numpy, and a name may stand twice: which one counts would be a guess."""
+    if len(members) > WIDEST:
+        raise InputError(f"{len(members)} arrays; at most {WIDEST} are read", file=file)
+    if len({name.removesuffix(".npy") for name in members}) < len(members):
+        raise InputError("holds an array of one name twice; store it once", file=file)
 
 
 def _require_columns(shape: tuple[int, ...], dtype: np.dtype, file: str) -> None:
@@ -183,8 +190,11 @@ def npz_blocks(path: Path, file: str) -> ArrayBlocks:
     """An archive of arrays to be read by blocks."""
     try:
         with zipfile.ZipFile(path) as archive:
+            _require_distinct(archive.namelist(), file)
             members = [name for name in archive.namelist() if name.endswith(".npy")]
         found = {name[:-4]: _stored(partial(_member, path, name)) for name in members}
+    except InputError:
+        raise
     except DAMAGED as e:
         raise InputError(f"not an archive of plain arrays ({first_line(e)})", file=file) from e
     return ArrayBlocks(file, {name: x for name, x in found.items() if x.dtype.kind in "biuf"})
