@@ -119,7 +119,7 @@ class Advice:
         if len(single) > 1:
             hardest = min(single, key=lambda advice: advice.limits[0].delta)
             parts.append(
-                f"Of single encoders, that of joint {hardest.label} asks most: {_step(hardest.limits[0].delta, self.unit)} for "
+                f"Of single encoders, that of joint {hardest.label} asks most: {step_text(hardest.limits[0].delta, self.unit)} for "
                 f"{hardest.limits[0].percent:g} % ({hardest.limits[0].parameter or 'no parameter'})."
             )
         doubted = [f"{advice.label} at {limit.percent:g} %" for advice in self.encoders for limit in advice.limits if not limit.agrees]
@@ -131,7 +131,7 @@ class Advice:
     def _sentence(self, limit: Limit, who: str) -> str:
         if not np.isfinite(limit.delta):
             return f"{who}, no step makes a parameter that matters change by {limit.percent:g} %."
-        text = f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = {_step(limit.delta, self.unit)} ({limit.parameter} first"
+        text = f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = {step_text(limit.delta, self.unit)} ({limit.parameter} first"
         if limit.sampled is not None:
             text += f"; {limit.sampled.runs} runs there gave {limit.error:.2f} +- {limit.half_width:.2f} %"
         return text + ")."
@@ -236,6 +236,7 @@ def counts(delta: float) -> str:
     return f"2*pi/{2 * np.pi / delta:.0f}" if 0 < delta < np.pi else ""
 
 
-def _step(delta: float, unit: str) -> str:
+def step_text(delta: float, unit: str) -> str:
+    """A step with its unit and, of a turn, its share, such as 9.16e-05 rad (2*pi/68626)."""
     text = counts(delta) if unit == "rad" else ""
     return f"{delta:.3g} {unit}" + (f" ({text})" if text else "")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from runtime.advice import Advice
+from runtime.advice import Advice, step_text
 from runtime.cestac_result import BIASED, NEGLIGIBLE, Level
 from runtime.estimate import Estimate
 from runtime.estimators import CLOSED_LOOP
@@ -220,8 +220,10 @@ def resolved(advice: Advice | None) -> Check:
     if advice is None:
         return Check(question, "open", "Not asked", limit, "ask with symgen report, or symgen cestac --advise")
     first = advice.encoders[0].limits
-    steps = ", ".join(f"{one.percent:g} % up to {Level(one.delta).label if np.isfinite(one.delta) else 'any step'}" for one in first)
-    text = f"Least squares stays within {steps} {advice.unit}"
+    steps = ", ".join(
+        f"{one.percent:g} % up to {step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}" for one in first
+    )
+    text = f"Least squares stays within {steps}"
     if not advice.asked:
         return Check(question, "open", text, limit, "compare these steps with that of your encoder (--encoder STEP)")
     name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
