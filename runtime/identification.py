@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from runtime.model import GeneratedModel
 from runtime.observation import Observation, observe, stack
 from runtime.perturbation import with_errors
 from runtime.record import Record
+from runtime.record_errors import RecordError, record_errors
 from runtime.record_stream import ChangedStream, Stream
 from runtime.streaming import halves, reduce_records
 from runtime.study import Study
@@ -86,6 +88,11 @@ class Identification:
     def carried(self) -> Estimate:
         """The fit that stands for the robot: of the essential parameters, or of all by a method that needs them all."""
         return self.found.estimate if self.study.estimate.method in LINEAR else self.chosen
+
+    @cached_property
+    def by_record(self) -> tuple[RecordError, ...]:
+        """Error of each record with the parameters that stand for the robot; empty where there is one record."""
+        return record_errors(self.observation, self.carried, [record.name for record in self.records]) if len(self.records) > 1 else ()
 
     @property
     def predicted_error(self) -> float:
@@ -149,6 +156,7 @@ class Identification:
             "warnings": self.warnings,
             "trust": self.trust.summary(),
             "coupling": {key: {"relative_error": e.relative_error, "per_joint": e.per_joint} for key, e in self.coupling.items()},
+            **({"by_record": self.by_record} if self.by_record else {}),
             "verdict": self.verdict,
         }
 
@@ -226,7 +234,10 @@ def rows_of(model: GeneratedModel, record: Record, study: Study) -> Observation:
 
 def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record | Stream]) -> dict[Coupling, Estimate]:
     """Fits of all parameters with the coupling of the drives in position and torque, in one, or in none; motor-side records only."""
-    if model.DRIVES is None or any(settings.side != "motor" for settings in study.record) or len(records) != len(study.record):
+    read = [settings.coupling for settings in study.record]
+    if len(records) != len(study.record):  # a record that was split at gaps, or records from elsewhere
+        read = [*set(read)] * len(records)
+    if model.DRIVES is None or any(settings.side != "motor" for settings in study.record) or len(read) != len(records):
         return {}
     drives = Drives.from_mapping(model.DRIVES)
     if not (drives.ratio - np.diag(np.diag(drives.ratio))).any():
@@ -236,8 +247,8 @@ def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record 
     compared = linear_companion(study.estimate) if simulated else point_estimate(study.estimate)
     for coupling in COUPLINGS:
         changed: list[Record | Stream] = []
-        for record, settings in zip(records, study.record, strict=True):
-            used, wanted = drives.decoupled(settings.coupling), drives.decoupled(coupling)
+        for record, own in zip(records, read, strict=True):
+            used, wanted = drives.decoupled(own), drives.decoupled(coupling)
             again = recoupled(record, used, wanted) if isinstance(record, Record) else recoupled_stream(record, used, wanted)
             changed.append(again)
         fits[coupling] = estimate(observed(model, changed, study, windows=()), compared, model=model)

@@ -27,6 +27,7 @@ class Record:
     t : ndarray, shape (N,), s.   q : ndarray, shape (N, n), rad or m.   tau : ndarray, shape (N, n), N m or N.
     rate : sampling rate, Hz.   q_r : what the controller followed, shape (N, n), where it is known.
     files : SHA-256 (of the uncompressed bytes) by file name, for the provenance of results.
+    time : what its time stamps were like and what was done about it, a sentence; "" where there were none.
     """
 
     t: Array
@@ -36,6 +37,7 @@ class Record:
     name: str = "record"
     files: Mapping[str, str] = field(default_factory=dict)
     q_r: Array | None = None
+    time: str = ""
 
     def __post_init__(self) -> None:
         t, q, tau = (np.array(x, dtype=float) for x in (self.t, self.q, self.tau))
@@ -70,7 +72,7 @@ class Record:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Records travel to other processes; a read-only mapping alone could not."""
-        return Record, (self.t, self.q, self.tau, self.rate, self.name, dict(self.files), self.q_r)
+        return Record, (self.t, self.q, self.tau, self.rate, self.name, dict(self.files), self.q_r, self.time)
 
 
 def check_finite(x: Array, names: list[str], file: str) -> None:

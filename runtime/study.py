@@ -17,98 +17,13 @@ from math import pi
 from typing import Any, Literal
 
 from runtime.controller_settings import Controller
-from runtime.errors import InputError, SettingsError
+from runtime.errors import SettingsError
 from runtime.excitation_settings import ExcitationSettings
-from runtime.io.units import position_unit, speed, time_unit, torque_unit
+from runtime.io.units import speed
 from runtime.mapping import plain, structure
+from runtime.record_settings import SHORTEST, Columns, Number, RecordSettings, Resample, Scale, Units, each_record
 
 SCHEMA = 1
-SHORTEST = 10  # samples of a record, or of a block of one: fewer cannot be filtered nor differentiated twice
-
-Number = float | tuple[float, ...]  # one for all joints, or one per joint
-
-
-@dataclass(frozen=True)
-class Columns:
-    """Names of the columns of a record file, one per joint; `t` is None where the record has no time column; `qr`: the reference positions, where the file
-    of the positions holds them, in the unit and on the side of q.
-
-    A name may be the number of the column (from 1) in a file without header, or an (N, n) array of a .npz or .mat file, which stands for its n columns.
-    """
-
-    t: str | None = None
-    q: tuple[str, ...] = ()
-    tau: tuple[str, ...] = ()
-    qr: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Units:
-    """Units of the columns: one, or one per joint, by any name that `runtime.io.units` knows: rad, deg, counts, mm; N*m, mA, ozf*inch; s, us.
-
-    Counts need the counts per revolution; units of current and voltage are turned into torque by the torque constant.
-    """
-
-    t: str = "s"
-    q: str | tuple[str, ...] = "rad"
-    tau: str | tuple[str, ...] = "N*m"
-
-    def __post_init__(self) -> None:
-        for key, check in (("t", time_unit), ("q", position_unit), ("tau", torque_unit)):
-            given = getattr(self, key)
-            for i, unit in enumerate(given if isinstance(given, tuple) else (given,)):
-                try:
-                    check(unit)
-                except InputError as e:
-                    raise SettingsError(e.message, path=(key, i) if isinstance(given, tuple) else (key,)) from None
-
-
-@dataclass(frozen=True)
-class Scale:
-    """Factors on the columns before their unit applies: a number, one per joint, or the name of a scalar in the file (EMPS: force = gtau*vir)."""
-
-    q: float | tuple[float, ...] | str = 1.0
-    tau: float | tuple[float, ...] | str = 1.0
-
-
-@dataclass(frozen=True)
-class RecordSettings:
-    """One measured record: where it lies and what its columns mean.
-
-    files : one file with everything, or two: positions (and time), then torques. Relative to the study file, or files of `dataset`.
-    side : "motor" (qm = R (q - offset), tau = R' u, by the drives of the robot) or "joint".
-    rate : sampling rate, Hz; may be left out where there is a time column.
-    counts_per_revolution : where the unit of q is counts.
-    torque_constant : N*m/A or N*m/V where the unit of tau is one of current or voltage (A, mA, V); default: that of the robot's drives.
-    coupling : use the off-diagonal part of R for "both", for "position" or "torque" alone, or for "none".
-    jitter : largest deviation of the time column from a uniform grid, in sampling periods.
-    topic : of a bag, where it holds several of sensor_msgs/JointState.
-    """
-
-    files: tuple[str, ...] = ()
-    columns: Columns = field(default_factory=Columns)
-    side: Literal["motor", "joint"] = "joint"
-    rate: float | None = None
-    units: Units = field(default_factory=Units)
-    scale: Scale = field(default_factory=Scale)
-    counts_per_revolution: Number | None = None
-    torque_constant: Number | None = None
-    coupling: Literal["both", "position", "torque", "none"] = "both"
-    jitter: float = 0.1
-    dataset: str | None = None
-    name: str | None = None
-    topic: str | None = None
-
-    def __post_init__(self) -> None:
-        _require(len(self.files) <= 2, ("files",), f"{len(self.files)} files; expected one, or two (positions, then torques)")
-        _require(self.rate is None or self.rate > 0, ("rate",), f"{self.rate} Hz; expected a positive rate")
-        _require(0 < self.jitter < 0.5, ("jitter",), f"{self.jitter}; expected a fraction of a sampling period between 0 and 0.5")
-        units = self.units.q if isinstance(self.units.q, tuple) else (self.units.q,)
-        _require(
-            self.counts_per_revolution is not None or all(position_unit(unit)[0] != "counts" for unit in units),
-            ("counts_per_revolution",),
-            "missing; positions in counts need it",
-        )
 
 
 @dataclass(frozen=True)
@@ -209,6 +124,7 @@ class ValidateSettings:
     record: tuple[RecordSettings, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "record", each_record(self.record))
         for i, (t0, t1) in enumerate(self.split):
             _require(t0 is None or t1 is None or t0 < t1, ("split", i), f"[{t0}, {t1}]; expected the earlier time first")
         _require(len(self.split) != 1, ("split",), "one window; expected at least two, the first to fit, the others to predict")
@@ -232,6 +148,7 @@ class PayloadSettings:
     gains: bool = False
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "record", each_record(self.record))
         families = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
         for family in self.known:
             _require(family in families, ("known", family), f"unknown parameter; a load has {', '.join(families)}")
@@ -286,6 +203,7 @@ class Study:
     stream: Literal["auto", "off"] | int = "auto"
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "record", each_record(self.record))
         _require(self.symgen == SCHEMA, ("symgen",), f"schema {self.symgen}; this version reads {SCHEMA}")
         blocks = self.stream if isinstance(self.stream, int) else SHORTEST
         _require(blocks >= SHORTEST, ("stream",), f"{blocks}; expected auto, off, or samples of a block, {SHORTEST} or more")
@@ -307,3 +225,26 @@ def to_mapping(settings: Any) -> dict[str, Any]:
 def _require(ok: bool, path: tuple[str | int, ...], message: str) -> None:
     if not ok:
         raise SettingsError(message, path=path)
+
+
+__all__ = [
+    "SCHEMA",
+    "SHORTEST",
+    "CestacSettings",
+    "Columns",
+    "Decimate",
+    "EssentialSettings",
+    "EstimateSettings",
+    "Lowpass",
+    "PayloadSettings",
+    "RecordSettings",
+    "Resample",
+    "Rows",
+    "Scale",
+    "Signals",
+    "Study",
+    "Units",
+    "ValidateSettings",
+    "study_from_mapping",
+    "to_mapping",
+]

@@ -16,7 +16,7 @@ from runtime.errors import InputError
 from runtime.io.joint_states import JointTable
 from runtime.io.table import Named, Table
 from runtime.io.units import COMMANDS, position_unit, torque_unit
-from runtime.study import Columns, RecordSettings
+from runtime.record_settings import Columns, RecordSettings
 
 Array = np.ndarray
 

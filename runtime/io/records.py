@@ -21,16 +21,28 @@ from runtime.io.timing import clock
 from runtime.io.units import time_unit
 from runtime.model import GeneratedModel
 from runtime.record import Record
-from runtime.study import RecordSettings
+from runtime.record_settings import RecordSettings, each_record
+from runtime.resampling import Stretch, resampled
+from runtime.time_stamps import time_stamps
 
 Array = np.ndarray
 
+IRREGULAR = 0.05  # between the rate of the settings and the median step of stamps that are resampled
+
 
 def read_record(settings: RecordSettings, drives: Drives | None = None, *, folder: Path | None = None) -> Record:
-    """The record that the settings describe, joint side, SI.
+    """The record that the settings describe, joint side, SI; InputError where `resample` splits it into several.
 
     drives : of the robot; needed where side is "motor".   folder : where relative file names start (default: the current folder).
     """
+    parts = read_parts(settings, drives, folder=folder)
+    if len(parts) > 1:
+        raise InputError(f"{len(parts)} pieces between gaps; read_records gives them all", file=parts[0].name)
+    return parts[0]
+
+
+def read_parts(settings: RecordSettings, drives: Drives | None = None, *, folder: Path | None = None) -> list[Record]:
+    """The record, or the records into which `resample` splits it at gaps and where time goes back."""
     paths = record_files(settings, folder)
     tables = [read_table(path, settings.topic) for path in paths]
     first, last = tables[0][0], tables[-1][0]
@@ -43,24 +55,25 @@ def read_record(settings: RecordSettings, drives: Drives | None = None, *, folde
     n = q.shape[1]
     if drives is not None and drives.n != n:
         raise InputError(f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file)
-    t, rate = _time(settings, first, names.t, len(q))
     side = conversion(settings, drives, first, last, n)
     q_r = reference_columns(first, names.qr, n)
-    return Record(
-        t,
-        side.position(q),
-        side.torque(tau),
-        rate,
-        settings.name or settings.dataset or paths[0].name.split(".")[0],
-        file_hashes(settings, [digest for _, digest in tables]),
-        None if q_r is None else side.position(q_r),
-    )
+    signals = [side.position(q), side.torque(tau), *([] if q_r is None else [side.position(q_r)])]
+    stretches, rate, text = _uniform(settings, first, names.t, signals)
+    name = settings.name or settings.dataset or paths[0].name.split(".")[0]
+    files = file_hashes(settings, [digest for _, digest in tables])
+    K = len(stretches)
+    parts = []
+    for k, stretch in enumerate(stretches, start=1):
+        own, torque, *reference = stretch.signals
+        called = name if K == 1 else f"{name} ({k} of {K})"
+        parts.append(Record(stretch.t, own, torque, rate, called, files, reference[0] if reference else None, text))
+    return parts
 
 
 def read_records(settings: Sequence[RecordSettings], model: GeneratedModel, *, folder: Path | None = None) -> list[Record]:
     """Several records of the robot of an emitted model, with its drives."""
     drives = None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
-    records = [read_record(s, drives, folder=folder) for s in settings]
+    records = [record for s in each_record(tuple(settings)) for record in read_parts(s, drives, folder=folder)]
     for record in records:
         if record.n != len(model.JOINTS):
             raise InputError(f"{record.n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}", file=record.name)
@@ -84,11 +97,36 @@ def record_files(settings: RecordSettings, folder: Path | None = None) -> list[P
     return [fetch(settings.dataset, file) for file in settings.files]
 
 
-def _time(settings: RecordSettings, table: Table, name: str | None, N: int) -> tuple[Array, float]:
-    """Time of the samples, s, from the first sample on, and the sampling rate, Hz."""
+def _uniform(settings: RecordSettings, table: Table, name: str | None, signals: Sequence[Array]) -> tuple[list[Stretch], float, str]:
+    """The samples at a uniform rate, Hz, and what their time stamps are like: as they are, or resampled where the settings ask for it."""
+    N = len(signals[0])
     if name is None:
         if settings.rate is None:
             raise InputError("no time column and no rate; set record.rate (Hz) or record.columns.t", file=table.file)
-        return np.arange(N) / settings.rate, settings.rate
+        return [Stretch(np.arange(N) / settings.rate, tuple(signals))], settings.rate, ""
     t = finite_columns(table, [name])[:, 0] * time_unit(settings.units.t)
-    return t, clock(settings, lambda: [table], name).rate
+    if settings.resample is None:
+        rate = _clock(settings, table, name, t)
+        return [Stretch(t, tuple(signals))], rate, time_stamps(t, file=table.file).to_text(table.row)
+    stamps = time_stamps(t, gap=settings.resample.longest, file=table.file)
+    if settings.rate is not None and abs(1 / stamps.period / settings.rate - 1) > IRREGULAR:
+        raise InputError(
+            f"time runs at {1 / stamps.period:g} Hz, record.rate is {settings.rate:g} Hz; correct one, or the unit of time", file=table.file
+        )
+    try:
+        stretches, rate, done = resampled(t, signals, stamps, settings.resample, settings.rate, file=table.file)
+    except InputError as e:
+        raise InputError(f"{e.message}. The stamps: {stamps.to_text(table.row)}", file=table.file, column=name) from None
+    return stretches, rate, f"{stamps.to_text(table.row)}; {done}"
+
+
+def _clock(settings: RecordSettings, table: Table, name: str, t: Array) -> float:
+    """The rate of uniform stamps, Hz; where they are not, the error tells all there is, since the first place is rarely the only one."""
+    try:
+        return clock(settings, lambda: [table], name).rate
+    except InputError as e:
+        if not (np.diff(t) > 0).any():
+            raise
+        said = time_stamps(t, file=table.file).to_text(table.row)
+        message = f"{e.message}. In all: {said}. record.resample: {{gaps: split}} cuts and resamples"
+        raise InputError(message, file=e.file, column=e.column, row=e.row) from None

@@ -26,8 +26,8 @@ from runtime.io.timing import clock
 from runtime.io.units import time_unit
 from runtime.model import GeneratedModel
 from runtime.record import Record
+from runtime.record_settings import SHORTEST, Columns, RecordSettings, each_record
 from runtime.record_stream import Stream
-from runtime.study import SHORTEST, Columns, RecordSettings
 
 Array = np.ndarray
 
@@ -92,6 +92,8 @@ def open_stream(settings: RecordSettings, drives: Drives | None = None, *, folde
     """The record that the settings describe, to be read by blocks of `block` samples; its files are read once, for hashes and clock."""
     if block < SHORTEST:
         raise InputError(f"blocks of {block} samples; expected at least {SHORTEST}")
+    if settings.resample is not None:
+        raise InputError("record.resample needs the whole record; set stream: off", file=settings.name or settings.files[0])
     paths = record_files(settings, folder)
     tables = tuple(open_table(path) for path in paths)
     first, last = tables[0], tables[-1]
@@ -130,7 +132,7 @@ def open_streams(
 ) -> list[FileStream]:
     """Several records of the robot of an emitted model, with its drives."""
     drives = None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
-    streams = [open_stream(s, drives, folder=folder, block=block) for s in settings]
+    streams = [open_stream(s, drives, folder=folder, block=block) for s in each_record(tuple(settings))]
     for stream in streams:
         if stream.n != len(model.JOINTS):
             raise InputError(f"{stream.n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}", file=stream.name)
@@ -147,7 +149,10 @@ def records_or_streams(
 
 
 def are_large(settings: Sequence[RecordSettings], folder: Path | None = None) -> bool:
-    """Whether the files of these records, of formats that can be read by blocks, hold LARGE bytes or more in all; those of data sets do not."""
+    """Whether the files of these records, of formats that can be read by blocks, hold LARGE bytes or more in all; those of data sets do not, nor those
+    that are resampled."""
+    if any(s.resample is not None for s in settings):
+        return False
     paths = [path for s in settings if s.dataset is None for path in record_files(s, folder)]
     readable = all(any(suffix.lower() in BLOCK_READERS for suffix in path.suffixes) for path in paths)
     return readable and sum(path.stat().st_size for path in paths if path.is_file()) >= LARGE

@@ -11,7 +11,7 @@ from runtime.errors import InputError
 from runtime.io.conversion import finite_columns
 from runtime.io.table import Table
 from runtime.io.units import time_unit
-from runtime.study import RecordSettings
+from runtime.record_settings import RecordSettings
 
 Array = np.ndarray
 
@@ -69,7 +69,7 @@ def _require_uniform(settings: RecordSettings, tables: Iterable[Table], name: st
         file, row, step_here = place
         raise InputError(
             f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step {step_here:g} s here, {1 / rate:g} s on average; "
-            "resample the record, or raise record.jitter if the clock is at fault",
+            "raise record.jitter if the clock alone is at fault",
             file=file,
             column=name,
             row=row,

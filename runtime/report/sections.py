@@ -38,6 +38,7 @@ def identification_sections(found: Identification) -> list[Section]:
         parameter_section(found),
         torque_section(found),
         joint_section(found),
+        *([record_section(found)] if found.by_record or time_texts(found) else []),
         residual_section(found, unit),
         weak_section(found),
         trust_section(found.trust),
@@ -87,6 +88,22 @@ def joint_section(found: Identification) -> Section:
         *([every.message] if every.message else []),
     )
     return Section("Errors in total and per joint", text, tables=[Table("Relative error by joint", header, rows)])
+
+
+def record_section(found: Identification) -> Section:
+    """Errors of each of several records, and what their time stamps were like."""
+    header = ("record", "rows", "error %", *(f"joint {joint.joint}" for joint in found.carried.per_joint))
+    rows = [
+        (one.name, str(one.rows), number(one.relative_error, ".2f"), *(number(e, ".2f") for e in one.per_joint)) for one in found.by_record
+    ]
+    tables = [Table("Relative error by record and joint, %", header, rows)] if rows else []
+    return Section("Records", time_texts(found), tables=tables)
+
+
+def time_texts(found: Identification) -> tuple[str, ...]:
+    """What the time stamps of the records were like, those of one file once."""
+    told = {record.name.split(" (")[0]: said for record in found.records if (said := getattr(record, "time", ""))}
+    return tuple(f"Time stamps of {name}: {said}." for name, said in told.items())
 
 
 def trail_section(found: Identification) -> Section:

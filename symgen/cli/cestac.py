@@ -11,6 +11,7 @@ import typer
 
 from symgen.cli.session import (
     NEGATIVE,
+    RECORDS,
     in_target,
     opened_model,
     origin,
@@ -32,7 +33,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 def cestac(
     robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py).")],
-    record: Annotated[str, typer.Argument(help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side).")],
+    record: Annotated[list[str], typer.Argument(help=RECORDS)],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Folder for report.html, cestac.json, .csv, .tex, .mat and .npz, the figure and study.yaml."),

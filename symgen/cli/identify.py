@@ -11,13 +11,14 @@ import typer
 from symgen.cli.beside import Beside, beside
 from symgen.cli.session import (
     NEGATIVE,
+    RECORDS,
     in_target,
     opened_model,
     origin,
     reported_errors,
     single_thread,
     study_text,
-    study_with_record,
+    study_with_records,
     symbolic_file,
 )
 from symgen.cli.writing import reserved
@@ -33,7 +34,7 @@ ONE_BLOCK = 40  # lines of parameters.tex that one page holds; more stand in two
 
 def identify(
     robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py).")],
-    record: Annotated[str, typer.Argument(help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side).")],
+    record: Annotated[list[str], typer.Argument(help=RECORDS)],
     output: Annotated[
         Path | None,
         typer.Option(
@@ -53,7 +54,7 @@ def identify(
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print estimate.json instead of tables.")] = False,
 ) -> None:
-    """Identify the base parameters of ROBOT from RECORD. Exit code 1 where the record does not determine them."""
+    """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code 1 where the record does not determine them."""
     single_thread()
     with reported_errors(), reserved(output) as results, opened_model(robot) as model:
         from runtime.identification import identification
@@ -61,7 +62,7 @@ def identify(
         from runtime.studies.compile_cache import processor
         from runtime.studies.compiled import target_of
 
-        study, folder = study_with_record(record)
+        study, folder = study_with_records(record)
         study = study if block is None else replace(study, stream=block)
         records = records_or_streams(study.record, model, study.stream, folder=folder)
         further = records_or_streams(study.validate.record, model, study.stream, folder=folder)
@@ -105,6 +106,7 @@ def console_text(found: Identification, more: Beside | None = None) -> str:
     ]
     parts = [fit.to_table(), found.found.to_table(), *(part.to_table() for part in found.validation)]
     parts += [
+        by_record_text(found),
         "\n".join(trading),
         weakest_text(found),
         found.trust.to_text(),
@@ -112,6 +114,17 @@ def console_text(found: Identification, more: Beside | None = None) -> str:
     ]
     parts += ["" if more is None else more.text(), found.verdict]
     return "\n\n".join(part for part in parts if part)
+
+
+def by_record_text(found: Identification) -> str:
+    """Errors of several records, and what the time stamps of any were like."""
+    from runtime.report.sections import time_texts
+
+    errors = [
+        f"error in {one.name}: {one.relative_error:.2f} % in total, per joint " + " ".join(f"{e:.2f}" for e in one.per_joint)
+        for one in found.by_record
+    ]
+    return "\n".join([*errors, *time_texts(found)])
 
 
 def weakest_text(found: Identification) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from symgen.cli.session import NEGATIVE, opened_model, origin, reported_errors, single_thread, study_text, study_with_record
+from symgen.cli.session import NEGATIVE, RECORDS, opened_model, origin, reported_errors, single_thread, study_text, study_with_records
 from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 def report(
     robot: Annotated[str, typer.Argument(help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py).")],
-    record: Annotated[str, typer.Argument(help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side).")],
+    record: Annotated[list[str], typer.Argument(help=RECORDS)],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for report.html and the files of identify and cestac.")] = Path(
         "report"
     ),
@@ -46,7 +46,7 @@ def report(
         from symgen.cli.identify import identification_files, simulator_of
         from symgen.cli.pages import judged
 
-        study, folder = study_with_record(record)
+        study, folder = study_with_records(record)
         records = records_or_streams(study.record, model, study.stream, folder=folder)
         further = records_or_streams(study.validate.record, model, study.stream, folder=folder)
         provenance = origin(records)

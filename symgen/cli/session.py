@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from runtime.study import Study
 
 BAD_INPUT, NEGATIVE = 2, 1
+RECORDS = "Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side). Further measured files like the first: records of their own."
 BROKEN_PIPE = 141  # as shells have it: 128 + SIGPIPE
 SIMULATED = "SIMULATED"  # first word of the name of a record that was not measured
 SIMULATED_WARNING = (
@@ -135,30 +136,45 @@ def symbolic_file(robot: str, model: GeneratedModel) -> Path:
     return path
 
 
-def study_and_records(record: str, model: GeneratedModel) -> tuple[Study, Path, list[Record]]:
-    """The study a RECORD argument means, the folder of its files, and its records."""
+def study_and_records(record: str | Sequence[str], model: GeneratedModel) -> tuple[Study, Path, list[Record]]:
+    """The study that one RECORD argument means, or several, the folder of its files, and its records."""
     from runtime.io.records import read_records
 
-    study, folder = study_with_record(record)
+    study, folder = study_with_records([record] if isinstance(record, str) else record)
     return study, folder, read_records(study.record, model, folder=folder)
 
 
-def study_with_record(record: str) -> tuple[Study, Path]:
-    """The study a RECORD argument means, which names a record, and the folder of its files."""
+def study_with_records(records: Sequence[str]) -> tuple[Study, Path]:
+    """The study that RECORD arguments mean, which names a record, and the folder of its files.
+
+    The first says how they are read: a study file, a dataset or a measured file; each further one is a measured file like it, a record of its own.
+    """
     from runtime.errors import InputError
     from runtime.io.study_files import study_of
+    from runtime.io.table import is_measured
 
-    study, folder = study_of(record)
+    study, folder = study_of(records[0])
     if not study.record:
-        raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=record)
-    return study, folder
+        raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=records[0])
+    like, further = study.record[-1], []
+    for record in records[1:]:
+        path = Path(record)
+        if path.suffix.lower() in (".yaml", ".yml") or not is_measured(path):
+            raise InputError(
+                "expected a measured file after the first RECORD: its columns, units and side are those of the first", file=record
+            )
+        if len(like.files) > 1:
+            raise InputError("the first RECORD has its positions and torques in two files; name further pairs in record.also", file=record)
+        further.append(replace(like, files=(os.path.relpath(path, folder),), dataset=None, name=None))
+    return replace(study, record=(*study.record, *further)), folder
 
 
 def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
     """Provenance of the records: their names, and whether they were simulated."""
     simulated = any(record.name.startswith(SIMULATED) for record in records)
     note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
-    return {"records": [record.name for record in records], "simulated": simulated, **note}
+    stamps = {record.name: said for record in records if (said := getattr(record, "time", ""))}
+    return {"records": [record.name for record in records], "simulated": simulated, **({"time": stamps} if stamps else {}), **note}
 
 
 def study_text(study: Study, folder: Path, destination: Path) -> str:

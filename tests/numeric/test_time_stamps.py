@@ -1,0 +1,227 @@
+"""Irregular clocks: what is said about them, and samples brought to a uniform rate against the analytic signal, never across a gap."""
+
+from copy import copy
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import planar_2r_model as planar
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from runtime import observe, read_record, read_records, study_from_mapping
+from runtime.errors import InputError
+from runtime.identification import coupling_fits
+from runtime.io.streams import are_large, open_stream, records_or_streams
+from runtime.record import Record
+from runtime.resampling import resampled
+from runtime.study import Resample
+from runtime.time_stamps import time_stamps
+
+RATE = 500.0
+T = np.arange(2000) / RATE
+PULSATIONS = 2 * np.pi * np.array([3.0, 11.0, 23.0])  # rad/s; at most 1/20 of the rate
+
+
+def signal(t):
+    """A band-limited signal, shape (N, 2), amplitude at most 1."""
+    s = np.stack([np.sin(PULSATIONS * x) for x in t]).sum(axis=1) / 3
+    c = np.stack([np.cos(PULSATIONS * x + 1) for x in t]).sum(axis=1) / 3
+    return np.stack([s, c], axis=1)
+
+
+# --- what is said -------------------------------------------------------------------------------------------------------
+
+
+def test_a_regular_clock():
+    found = time_stamps(T)
+    assert found.regular and found.samples == 2000 and found.period == pytest.approx(1 / RATE) and found.jitter < 1e-9
+    assert found.to_text().startswith("2000 samples, median step 0.002 s, jitter up to ")
+
+
+def test_every_irregularity_is_found():
+    t = T.copy()
+    t[100:] += 0.5  # a gap of 251 periods ends in sample 101
+    t[500:] -= 0.2  # back by 99 periods
+    t[900] = t[899]
+    t[1200:] += 0.01
+    found = time_stamps(t)
+    assert [(s.sample, round(s.step, 6)) for s in found.gaps] == [(100, 0.502), (1200, 0.012)]
+    assert [(s.sample, round(s.step, 6)) for s in found.resets] == [(500, -0.198)]
+    assert [s.sample for s in found.repeats] == [900]
+    text = found.to_text()
+    assert "2 gaps at sample 101 (t = 0.198 s, 0.502 s, 251 periods), sample 1201" in text
+    assert "1 step back at sample 501 (t = 1.498 s, -0.198 s)" in text and "1 repeated stamp at sample 901 (t = 2.098 s)" in text
+
+
+def test_many_gaps_are_counted_and_the_largest_named():
+    t = T.copy()
+    for k in range(10):
+        t[100 * (k + 1) :] += 0.1 * (k + 1)
+    text = time_stamps(t).to_text(lambda i: f"line {i + 2}")
+    assert "10 gaps, the largest at line 1002 (" in text and text.count("line ") == 3
+
+
+def test_jitter_is_told():
+    rng = np.random.default_rng(0)
+    found = time_stamps(T + rng.uniform(-0.05, 0.05, len(T)) / RATE)
+    assert 0.08 < found.jitter < 0.11 and 0.03 < found.jitter_rms < 0.05
+    with pytest.raises(InputError, match="never goes forward"):
+        time_stamps(T[::-1])
+
+
+# --- resampling ---------------------------------------------------------------------------------------------------------
+
+
+@st.composite
+def clocks(draw):
+    """Stamps with jitter up to a third of a period, gaps, resets and repeats."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    step = (1 + draw(st.floats(0, 0.33)) * rng.uniform(-1, 1, 1500)) / RATE
+    for _ in range(draw(st.integers(0, 3))):
+        step[draw(st.integers(1, 1499))] = draw(st.sampled_from([0.05, 0.5, -0.3, -1.0, 0.0]))
+    return np.cumsum(step)
+
+
+@given(t=clocks(), method=st.sampled_from(["cubic", "linear"]), rate=st.sampled_from([None, RATE, 777.0]))
+def test_resampled_signal_is_the_signal(t, method, rate):
+    """To the bounds of de Boor at steps of 1.66 periods (a step of 1 + 2 x 0.33), inside of a stretch; the grid is exact; no sample lies in a gap."""
+    stamps = time_stamps(t)
+    stretches, found_rate, _ = resampled(
+        t, [signal(t)], stamps, Resample(rate=rate, method=method, gaps="split", shortest=0.1), None, file="x"
+    )
+    if rate is not None:
+        assert found_rate == rate
+    h = 1.66 / RATE * PULSATIONS.max()
+    bound = {"linear": h**2 / 8, "cubic": 5 * h**4 / 384}[method]
+    inner = slice(0, None) if method == "linear" else slice(20, -20)
+    cuts = [0, *sorted(s.sample for s in (*stamps.gaps, *stamps.resets)), len(t)]
+    covered = [(t[a], t[b - 1]) for a, b in pairwise(cuts)]
+    for stretch in stretches:
+        assert np.array_equal(stretch.t, stretch.t[0] + np.arange(len(stretch.t)) / found_rate)
+        assert any(first == stretch.t[0] and stretch.t[-1] <= last + 1e-6 / found_rate for first, last in covered)
+        np.testing.assert_allclose(stretch.signals[0][inner], signal(stretch.t)[inner], rtol=0, atol=bound)
+    assert sum(len(stretch.t) for stretch in stretches) > 0
+
+
+def test_regular_samples_stay_as_they_are():
+    for method in ("cubic", "linear"):
+        (stretch,), rate, text = resampled(T, [signal(T)], time_stamps(T), Resample(method=method), RATE, file="x")
+        np.testing.assert_allclose(stretch.signals[0], signal(T), rtol=0, atol=1e-12)
+        assert rate == RATE and len(stretch.t) == len(T) and text == f"resampled at 500 Hz ({method}): 2000 samples in 1 stretch"
+
+
+def test_a_repeated_stamp_keeps_its_first_sample():
+    t, x = np.insert(T, 700, T[699]), np.insert(signal(T), 700, [9, 9], axis=0)
+    (stretch,), _, text = resampled(t, [x], time_stamps(t), Resample(), RATE, file="x")
+    np.testing.assert_allclose(stretch.signals[0], signal(T), atol=1e-12)
+    assert text.endswith("1 samples of repeated stamps left out")
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (Resample(), "time has gaps or goes back; set record.resample.gaps: split"),
+        (Resample(gaps="split", rate=100), "below the 500 Hz of the record"),
+        (Resample(gaps="split", shortest=5), "no stretch of 5 s without a gap"),
+    ],
+)
+def test_refused(settings, said):
+    t = T + 0.5 * (np.arange(len(T)) >= 800)
+    with pytest.raises(InputError) as e:
+        resampled(t, [signal(t)], time_stamps(t), settings, None, file="x")
+    assert said in str(e.value)
+
+
+# --- records ------------------------------------------------------------------------------------------------------------
+
+
+def write(tmp_path, t):
+    np.savez(tmp_path / "a.npz", t=t, q1=signal(t)[:, 0], q2=signal(t)[:, 1], tau1=t, tau2=-t)
+
+
+def study(**record):
+    return study_from_mapping({"record": {"files": "a.npz", **record}})
+
+
+def test_a_record_with_a_gap_becomes_two(tmp_path):
+    t = T + 0.5 * (np.arange(len(T)) >= 800)
+    write(tmp_path, t)
+    asked = study(resample={"gaps": "split", "rate": 500})
+    records = read_records(asked.record, planar, folder=tmp_path)
+    assert [(r.name, len(r), r.rate) for r in records] == [("a (1 of 2)", 800, 500), ("a (2 of 2)", 1200, 500)]
+    np.testing.assert_allclose(np.concatenate([r.tau[:, 0] for r in records]), t, atol=1e-12)
+    assert (
+        "1 gap at sample 801 (t = 1.598 s, 0.502 s, 251 periods); resampled at 500 Hz (cubic): 2000 samples in 2 stretches"
+        in records[0].time
+    )
+    with pytest.raises(InputError, match="2 pieces between gaps; read_records gives them all"):
+        read_record(asked.record[0], folder=tmp_path)
+    assert copy(records[0]).time == records[0].time  # as it travels to other processes
+
+
+def test_errors_tell_all_irregularities(tmp_path):
+    t = T + 0.5 * (np.arange(len(T)) >= 800)
+    t[100] = t[99]
+    write(tmp_path, t)
+    for record, said in (
+        ({}, "sample 101: time goes from 0.198 s to 0.198 s; expected increasing time. In all: 2000 samples"),
+        ({"resample": {}}, "set record.resample.gaps: split"),
+        ({"resample": {"gaps": "split"}, "rate": 1000}, "time runs at 500 Hz, record.rate is 1000 Hz"),
+    ):
+        with pytest.raises(InputError) as e:
+            read_record(study(columns={"t": "t"}, **record).record[0], folder=tmp_path)
+        assert "a.npz" in str(e.value) and said in str(e.value)
+        assert "rate" in record or ("1 gap at sample 801" in str(e.value) and "1 repeated stamp at sample 101" in str(e.value))
+
+
+def test_tolerable_jitter_is_stated(tmp_path):
+    write(tmp_path, T + np.random.default_rng(1).uniform(-0.02, 0.02, len(T)) / RATE)
+    record = read_record(study().record[0], folder=tmp_path)
+    assert record.time.startswith("2000 samples, median step 0.00") and "jitter up to 4" in record.time
+    assert read_record(study(rate=RATE).record[0], folder=tmp_path).time == ""
+
+
+def test_streams_refuse_to_resample(tmp_path, monkeypatch):
+    write(tmp_path, T)
+    asked = study(resample={})
+    with pytest.raises(InputError, match=r"record\.resample needs the whole record; set stream: off"):
+        open_stream(asked.record[0], folder=tmp_path)
+    monkeypatch.setattr("runtime.io.streams.LARGE", 10)
+    assert not are_large(asked.record, tmp_path) and are_large(study().record, tmp_path)
+    assert isinstance(records_or_streams(asked.record, planar, "auto", folder=tmp_path)[0], Record)
+
+
+def test_resampled_record_identifies_as_the_regular_one(tmp_path):
+    """A motion sampled by a clock with 20 % jitter: W is that of the regular one to a thousandth, as the first samples are a tenth of a period apart."""
+    from planar_data import motion
+
+    t = np.arange(4000) / 1000
+    jittered = t + np.random.default_rng(2).uniform(-0.1, 0.1, len(t)) / 1000
+    found = []
+    for name, at in (("regular", t), ("jittered", jittered)):
+        q = motion(at)[0]
+        np.savez(tmp_path / f"{name}.npz", t=at, q1=q[:, 0], q2=q[:, 1], tau1=at, tau2=at)
+        asked = study_from_mapping({"record": {"files": f"{name}.npz", "rate": 1000, "columns": {"t": "t"}, "resample": {}}})
+        found.append(observe(planar, read_records(asked.record, planar, folder=tmp_path)[0], asked))
+    K = min(len(o.Y) for o in found) // 2
+    one, other = (np.concatenate([o.W[: o.rows[0]][:K], o.W[o.rows[0] :][:K]]) for o in found)
+    scale = np.abs(one).max(axis=0)
+    smooth = [i for i, name in enumerate(planar.BASE_PARAMETERS) if not name.startswith("FS")]
+    np.testing.assert_allclose((other / scale)[:, smooth], (one / scale)[:, smooth], atol=1e-3)
+
+
+def test_coupling_of_a_split_record(tmp_path):
+    """The fits with and without coupling cover all pieces."""
+    t = np.arange(3000) / RATE
+    t = t + 0.5 * (np.arange(3000) >= 1600)
+    write(tmp_path, t)
+    asked = study(side="motor", resample={"gaps": "split"})
+
+    drives = {"ratio": [[10.0, 0.0], [5.0, 10.0]], "offset": [0.0, 0.0], "torque_constant": [1.0, 1.0]}
+    model = SimpleNamespace(**{**vars(planar), "DRIVES": drives})
+    records = read_records(asked.record, model, folder=tmp_path)
+    fits = coupling_fits(model, asked, records)
+    assert len(records) == 2
+    assert set(fits) == {"both", "position", "torque", "none"} and set(fits["both"].provenance["files"]) == {"a.npz"}
