@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from symgen.cli.session import opened_model, progress_bar, reported_errors, single_thread, study_and_records, symbolic_file, yaml_text
+from symgen.cli.session import opened_model, progress_bar, reported_errors, single_thread, symbolic_file, yaml_text
 from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def excite(
 ) -> None:
     """Search an exciting motion. Families, limits and distances: section `excitation` of a study file.
 
-    Without RECORD, parameters are the values of the robot file.
+    Without RECORD, or with a study file that names none, parameters are the values of the robot file.
     """
     single_thread()
     given: dict[str, Any] = {"criterion": criterion, "starts": starts, "rate": rate, "seed": seed}
@@ -62,6 +62,8 @@ def excite(
     with reported_errors(), reserved(output) as results, opened_model(robot) as model:
         from runtime.excitation import limits_of
         from runtime.excitation_settings import ExcitationSettings
+        from runtime.io.records import read_records
+        from runtime.io.study_files import study_of
         from runtime.mapping import structure
         from runtime.studies.excitation import excite as search
         from runtime.study import Study, to_mapping
@@ -69,7 +71,8 @@ def excite(
         study = Study()
         records: list[Record] = []
         if record is not None:
-            study, _, records = study_and_records(record, model)
+            study, folder = study_of(record)
+            records = read_records(study.record, model, folder=folder)
         asked = to_mapping(study.excitation) if study.excitation is not None else {}
         settings = structure(ExcitationSettings, {**asked, **{k: v for k, v in given.items() if v is not None}})
         known = _known(model, replace(study, excitation=settings), settings, records)

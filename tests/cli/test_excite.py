@@ -85,3 +85,12 @@ def test_bad_input_is_one_line(study: Path, tmp_path: Path) -> None:
         assert done.exit_code == 2 and said in done.stderr, done.output
         assert len(done.stderr.strip().splitlines()) == 1
     assert run("excite", "scara").exit_code == 2
+
+
+def test_settings_without_a_record_use_the_values_of_the_robot(tmp_path: Path) -> None:
+    """Such a study was refused: families and limits could not be chosen before the first record."""
+    study = tmp_path / "search.yaml"
+    study.write_text(STUDY, encoding="utf-8")
+    done = run("excite", "emps", study, "--starts", 1, "--rate", 200, "-o", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert json.loads((tmp_path / "out" / "excitation.json").read_text())["parameters_from"] == "values of the robot file"

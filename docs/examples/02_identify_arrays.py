@@ -1,0 +1,29 @@
+"""Identification of arrays: no file, no command, only positions and torques in memory."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from runtime import Record, load_model, observe, study_from_mapping
+from runtime.estimators import estimate
+from symgen import generate_module, load_robot
+
+module = Path(tempfile.mkdtemp()) / "planar_2r.py"
+module.write_text(generate_module(load_robot("planar_2r")))
+model = load_model(module)
+
+# A measurement: here computed from the values of the robot file, with torque noise.
+t = np.arange(0, 20, 0.002)
+w, a = np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]), np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]])
+phase = t[:, None, None] * w
+q = (a * np.sin(phase)).sum(axis=1)
+qd, qdd = (a * w * np.cos(phase)).sum(axis=1), (-a * w**2 * np.sin(phase)).sum(axis=1)
+truth = model.base_parameters(model.VALUES)
+tau = model.inverse_dynamics(q, qd, qdd, truth) + np.random.default_rng(0).normal(0, 0.2, q.shape)
+
+record = Record(t, q, tau, rate=500.0)
+study = study_from_mapping({"signals": {"lowpass": {"cutoff": 20}}})
+found = estimate(observe(model, record, study), study.estimate, model=model)
+for name, x, sigma, true in zip(found.names, found.X, found.sigma_corrected, truth, strict=True):
+    print(f"{name:8} {x:9.4f} +- {sigma:.4f}   truth {true:9.4f}")

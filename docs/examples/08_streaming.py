@@ -1,0 +1,28 @@
+"""A record larger than memory: read by blocks, reduced to triangular factors, the same parameters."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from runtime import load_model, observe, open_streams, read_records, reduce_records, study_from_mapping
+from runtime.estimators import estimate
+from symgen import generate_module, load_robot
+
+folder = Path(tempfile.mkdtemp())
+(folder / "planar_2r.py").write_text(generate_module(load_robot("planar_2r")))
+model = load_model(folder / "planar_2r.py")
+
+t = np.arange(0, 20, 0.002)
+w, a = np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]), np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]])
+phase = t[:, None, None] * w
+q = (a * np.sin(phase)).sum(axis=1)
+qd, qdd = (a * w * np.cos(phase)).sum(axis=1), (-a * w**2 * np.sin(phase)).sum(axis=1)
+tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(model.VALUES)) + np.random.default_rng(0).normal(0, 0.2, q.shape)
+np.savetxt(folder / "log.csv", np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
+
+study = study_from_mapping({"record": {"files": ["log.csv"]}, "signals": {"lowpass": {"cutoff": 20}}})
+blocks = reduce_records(model, open_streams(study.record, model, folder=folder, block=1000), study)
+whole = observe(model, read_records(study.record, model, folder=folder)[0], study)
+by_blocks, at_once = (estimate(seen, study.estimate, model=model) for seen in (blocks, whole))
+print("largest difference, in sigma:", np.abs((by_blocks.X - at_once.X) / at_once.sigma).max())
