@@ -29,6 +29,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "casadi": ("symgen/derive/lagrange.py", "runtime/studies/simulation", "runtime/studies/excitation.py", "generated/"),
     "pooch": ("runtime/io/datasets.py",),
     "pint": ("runtime/io/units.py",),
+    "mujoco": ("symgen/description/mjcf.py",),
     "polars": ("runtime/io/tables.py",),
     "h5py": ("runtime/io/mat.py",),
     "rosbags": ("runtime/io/bags.py",),
@@ -41,7 +42,7 @@ ONLY_IN = {  # library: files and folders that may import it
 }
 LAZY = {  # pooch and its requests are loaded only for a dataset, numpy only for a URDF, the text of pages only in a notebook
     "runtime.io.records": {"runtime.io.datasets"},
-    "symgen.description.files": {"symgen.description.urdf"},
+    "symgen.description.files": {"symgen.description.urdf", "symgen.description.mjcf"},
     "symgen.regroup.regrouping": {"symgen.report.notebook"},
 }
 FORBIDDEN_CALLS = {"eval", "exec", "sympify", "parse_expr", "__import__"}
