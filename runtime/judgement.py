@@ -67,8 +67,9 @@ class Judgement:
 
     @property
     def answer(self) -> str:
-        """Yes, with care, or no."""
-        return ANSWERS[self.state]
+        """Yes, with care, or no; a yes says where something was not judged."""
+        open_ones = any(check.state == "open" for check in self.checks)
+        return ANSWERS[self.state] + (", as far as judged" if self.state == "good" and open_ones else "")
 
     @property
     def worst(self) -> Check | None:

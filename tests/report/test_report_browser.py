@@ -96,7 +96,7 @@ def test_structure(browser, folder, verb):
 
 def test_verdict_is_said_in_words_and_first(shown, page):
     answer = shown.run("document.querySelector('.answer').textContent.trim()")
-    assert answer.split()[0] in "✓!✕" and answer[1:].strip() in ("Yes", "With care", "No")
+    assert answer.split()[0] in "✓!✕" and answer[1:].strip() in ("Yes", "Yes, as far as judged", "With care", "No")
     text = shown.run("document.querySelector('.verdict').textContent")
     assert "Can I use these values?" in text and "Biggest doubt:" in text and "Next:" in text
     assert shown.run("document.querySelector('.verdict').getBoundingClientRect().bottom") < 500
@@ -224,7 +224,14 @@ def test_print_is_whole(browser, page):
             if width > 1000
             else browser.run("[...document.querySelectorAll('section.broad table')].map((n) => n.textContent.slice(0, 40))")
         )
-        assert found == {"controls": 0, "images": True, "cut": [c for c in found["cut"] if c in broad], "folded": 0, "listing": True, "heads": ["contents"]}
+        assert found == {
+            "controls": 0,
+            "images": True,
+            "cut": [c for c in found["cut"] if c in broad],
+            "folded": 0,
+            "listing": True,
+            "heads": ["contents"],
+        }
     pdf = base64.b64decode(browser.call("Page.printToPDF", printBackground=True, preferCSSPageSize=True)["data"])
     assert pdf.startswith(b"%PDF") and browser.run("[...document.querySelectorAll('details')].every((n) => n.open)")
 

@@ -130,7 +130,7 @@ def identified(estimate, unseen=5.0):
 def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
     judgement = judge(identified(estimate, unseen))
     assert judgement.state == state
-    assert judgement.answer == {"good": "Yes", "doubtful": "With care", "no": "No"}[state]
+    assert judgement.answer == {"good": "Yes, as far as judged", "doubtful": "With care", "no": "No"}[state]
     if question is None:
         assert judgement.worst is None and "not judged" in judgement.doubt
     else:
@@ -153,7 +153,8 @@ def test_physical_consistency_counts():
 def test_encoder_in_use_counts(error, state):
     limits = [SimpleNamespace(percent=1.0, delta=1e-4), SimpleNamespace(percent=5.0, delta=2e-4)]
     advice = SimpleNamespace(encoders=[SimpleNamespace(limits=limits)], unit="rad", asked=(1e-3,), worst=lambda k: ("A1", error))
-    assert judge(identified(fit()), advice=advice).state == state
+    asked = judge(identified(fit(details={"standard": {}})), advice=advice)
+    assert asked.state == state and asked.answer == {"good": "Yes", "doubtful": "With care", "no": "No"}[state]
     advice.asked = ()
     judgement = judge(identified(fit()), advice=advice)
     assert judgement.state == "good" and judgement.checks[-1].state == "open" and "--encoder" in judgement.checks[-1].remedy
