@@ -23,6 +23,7 @@ from runtime.errors import InputError, SettingsError
 from runtime.mapping import structure
 
 MOST = 1000  # harmonics, terms or points of one part: far more than a motion of a robot has, few enough for any memory
+MOST_PARTS = 100  # of a chain
 
 Array = np.ndarray
 States = tuple[Any, Any, Any]  # q, qd, qdd
@@ -272,6 +273,8 @@ def motion_from_mapping(mapping: Mapping[str, Any]) -> Motion:
     parts = mapping.get("parts")
     if not isinstance(parts, Sequence) or isinstance(parts, str):
         raise SettingsError("no `parts` in this trajectory; expected a list of families with their coefficients `p`")
+    if len(parts) > MOST_PARTS:
+        raise SettingsError(f"{len(parts)} parts; at most {MOST_PARTS} in one trajectory", path=("parts",))
     found = []
     for number, part in enumerate(parts, start=1):
         if not isinstance(part, Mapping) or "p" not in part:

@@ -112,13 +112,16 @@ def jobs_of(path: Path) -> list[Job]:
     """The jobs of a fleet file, names made distinct; raises SettingsError with file, line and key."""
     fleet = settings_from_text(FleetSettings, text_of(path), file=path.name)
     jobs: list[Job] = []
+    taken: set[str] = set()
+    numbers: dict[str, int] = {}
     for settings in fleet.jobs:
         robot, record = (beside(name, path.parent) for name in (settings.robot, settings.record))
         wanted = settings.name or f"{Path(settings.robot).stem}-{Path(settings.record).name.split('.')[0]}"
         name = folder = re.sub(r"[^\w.-]+", "_", wanted).strip(".") or "job"
-        taken, number = {job.name.lower() for job in jobs}, 2
         while name.lower() in taken:
-            name, number = f"{folder}-{number}", number + 1
+            numbers[folder.lower()] = number = numbers.get(folder.lower(), 1) + 1
+            name = f"{folder}-{number}"
+        taken.add(name.lower())
         jobs.append(Job(name, robot, record))
     return jobs
 
