@@ -19,7 +19,7 @@ SUFFIXES = (".yaml", ".yml", ".par", ".urdf")
 
 
 def convert(
-    source: Annotated[str, typer.Argument(metavar="IN", help="Packaged robot, or a file: .yaml, .par, .urdf.")],
+    source: Annotated[str, typer.Argument(metavar="IN", help="Packaged robot, or a file: .yaml, .par, .urdf, .xml or .mjcf (MJCF).")],
     output: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; its suffix names the format: .yaml, .par, .urdf.")],
     constant: Annotated[list[str] | None, typer.Option(help="Value of a symbol of a .par file, D3=0.45 (SI, rad); repeat.")] = None,
     snap: Annotated[
@@ -29,7 +29,7 @@ def convert(
         ),
     ] = 0.0,
     keep_fixed: Annotated[
-        bool, typer.Option("--keep-fixed", help="Of a URDF: links that fixed joints hold (tool0, flange) stay frames of their own.")
+        bool, typer.Option("--keep-fixed", help="Of a URDF or MJCF: links that fixed joints hold (tool0, flange) are frames of their own.")
     ] = False,
     values: Annotated[
         Path | None,

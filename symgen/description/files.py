@@ -1,4 +1,4 @@
-"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par` and URDF, by suffix."""
+"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par`, URDF and MJCF, by suffix."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False) -> Robot:
 
     Parameters
     ----------
-    source : name of a packaged robot (`tx40`) or path of a robot file (`arm.yaml`, `./tx40`), a `.par` file or a `.urdf`.
-    keep_fixed : of a URDF, keep links that fixed joints hold as fixed frames, as `read_urdf`.
+    source : name of a packaged robot (`tx40`) or path of a robot file (`arm.yaml`, `./tx40`), a `.par` file, a `.urdf`, or an MJCF
+        (`.xml`, `.mjcf`; extra `mjcf`).
+    keep_fixed : of a URDF or MJCF, keep links that fixed joints hold as fixed frames, as `read_urdf`.
 
     Raises
     ------
@@ -53,6 +54,10 @@ def read_robot(
         from symgen.description.urdf import read_urdf  # numpy, which robot files do without
 
         return read_urdf(content, path.name, nearly=nearly, keep_fixed=keep_fixed)
+    if path.suffix.lower() in (".xml", ".mjcf"):
+        from symgen.description.mjcf import read_mjcf  # mujoco, an extra
+
+        return read_mjcf(content, path.name, keep_fixed=keep_fixed)
     return parse_robot(content, path.name), ()
 
 

@@ -63,6 +63,7 @@ class Tree:
     joints: tuple[Joint, ...]
     root: str
     relations: Mapping[str, Relation] = field(default_factory=dict)
+    bare: frozenset[str] = frozenset()  # links between the joints of one body, which have no mass
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
     notes: tuple[str, ...] = ()
 

@@ -3,8 +3,8 @@
 Links joined by fixed joints are one body. Body j moves about or along z_j, the axis of its joint; x_i lies on the common normal of z_i and of the
 axis of the first joint that body i carries, so that this joint has gamma = b = 0; further branches have them. Parallel axes: the
 normal through the origin. Axes that are nearly parallel have no usable normal: a fixed frame without link turns in between. A joint position
-is that of the file, sign and zero included; frame 0 is the root link's. Where fixed joints are kept, each link that one holds is a fixed frame of its
-own, its link frame that of the file, after all that move: numbers of joints, and the table of what moves, are the same either way.
+is that of the file, sign and zero included; frame 0 is the root link's. Where fixed joints are kept, each link that one holds is a fixed frame too, its
+link frame that of the file, after all that move; its inertia stays with the body, so that formulas and numbers of joints are the same either way.
 
 Lengths become constants, equal ones (but for the sign) the same constant, so that the formulas know what is special about the robot.
 """
@@ -58,10 +58,9 @@ def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
         j = _add(table, ant, joint, parent)
         waiting += [(j, *carried) for carried in reversed(table.bodies[j].joints)]
     if keep_fixed:
-        for j, body in sorted(table.bodies.items()):
-            _, *held = body.links
-            for name in held:
-                _keep(table, j, name, body.links.pop(name))
+        for j, body in table.bodies.items():
+            for name, pose in list(body.links.items())[1:]:
+                _keep(table, j, name, pose)
     return table
 
 
@@ -73,8 +72,7 @@ def _keep(table: Table, ant: int, name: str, pose: Array) -> None:
     before = _numbered(_normal(pose[:3, 2], pose[:3, 3]))
     rest = np.linalg.inv(_transform((*before, 0.0, 0.0))) @ pose
     theta, r = _numbered((math.atan2(rest[1, 0], rest[0, 0]), rest[2, 3]))
-    found, j = _row(table, ant, FIXED, before, theta, r)
-    table.bodies[j] = Body({name: np.linalg.inv(found) @ pose}, [])
+    _, j = _row(table, ant, FIXED, before, theta, r)
     table.kept[j] = name
 
 
@@ -201,6 +199,6 @@ def _length(table: Table, name: str, x: float) -> Expression:
         return ZERO
     known = next((k for k, value in table.constants.items() if abs(abs(value) - abs(x)) <= SAME), None)
     if known is None:
-        table.constants[name] = abs(x)
+        table.constants[name] = abs(float(x))
         known = name
     return Expression.symbol(known) * (1 if x > 0 else -1)

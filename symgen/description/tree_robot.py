@@ -126,33 +126,24 @@ def _limits(table: Table, actuated: list[int]) -> dict[str, tuple[float, ...] | 
 
 
 def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozenset[int]]:
-    """Standard parameters by name, empty where no link has inertia, and the fixed frames without mass."""
+    """Standard parameters by name, empty where no link has inertia, and the frames without a link of their own."""
     links = table.tree.links
-    frames = {f.j: f for f in table.frames}
-    bodies = {j: body for j, body in table.bodies.items() if j in table.joint or (j in table.kept and _carried(table, j))}
-    heavy = {j for j, body in bodies.items() if any(links[name] is not None for name in body.links)}
-    massless = frozenset(j for j in frames if frames[j].sigma == FIXED and j not in heavy)
-    if not heavy:
+    bodies = {j: body for j, body in table.bodies.items() if j in table.joint}
+    bare = {j for j, body in bodies.items() if set(body.links) <= table.tree.bare}
+    massless = frozenset(f.j for f in table.frames if f.sigma == FIXED or f.j in bare)
+    if not any(links[name] is not None for body in bodies.values() for name in body.links):
         table.notes.append("no link has an <inertial>: the robot has no values")
         return {}, massless
     values: dict[str, float] = {}
     for j, body in bodies.items():
-        if j in massless:
+        if j in bare:
             continue
-        if j not in heavy:
+        if all(links[name] is None for name in body.links):
             table.notes.append(f"no <inertial> on {', '.join(f'{name!a:.60}' for name in body.links)}: values of link {j} are 0")
         values |= {parameter(p, j): x for p, x in zip(INERTIAL, _standard(table, body), strict=True)}
     for family, _, value in FAMILIES:
         values |= {parameter(family, j): value(table.joint[j]) for j in _keys(table, family, actuated)}
     return values, massless
-
-
-def _carried(table: Table, j: int) -> bool:
-    """Whether a joint carries frame j."""
-    ant = {f.j: f.ant for f in table.frames}
-    while j and j not in table.joint:
-        j = ant[j]
-    return j > 0
 
 
 def _standard(table: Table, body: Body) -> tuple[float, ...]:

@@ -17,8 +17,8 @@ def read_urdf(content: bytes, file: str, *, nearly: float = 0.0, keep_fixed: boo
     ----------
     content, file : bytes and name of the file.
     nearly : rad; angles of the file this close to a multiple of pi/12 are taken as that, 1e-4 for files that say 1.5708.
-    keep_fixed : links held by fixed joints (tool0, flange) are fixed frames (sigma 2) with inertial parameters of their own, for frame_poses and
-        jacobian; else they are one body with the link that holds them. Torques are the same.
+    keep_fixed : links held by fixed joints (tool0, flange) are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else they
+        are only part of the body that holds them, to which their inertia belongs either way.
 
     Raises
     ------

@@ -142,7 +142,7 @@ def test_kept_frames_of_published_robots(make) -> None:
     text = make()
     merged, _ = read_urdf(text.encode(), "arm.urdf")
     robot, notes = read_urdf(text.encode(), "arm.urdf", keep_fixed=True)
-    assert robot.frames[: len(merged.frames)] == merged.frames
+    assert robot.frames[: len(merged.frames)] == merged.frames and robot.parameters == merged.parameters and robot.values == merged.values
     assert len(kept_frames(notes)) == text.count('type="fixed"') == len(robot.frames) - len(merged.frames)
     assert pose_difference(text, robot, notes, 4) < 1e-12
     assert difference(text, robot, legend(notes), 1) < TOLERANCE

@@ -1,0 +1,284 @@
+"""MJCF to a Robot, by MuJoCo's own compiler (extra `mjcf`): its bodies and joints become a tree, the tree a table of Khalil frames.
+
+A body with joints 1 .. k, applied one after the other about the points p_i, is a chain of k links, all but the last without mass,
+
+    iTb = Trans, Rot of the body;  then for each joint  Trans(p) Rot(axis, q - ref) Trans(-p)  or  Trans(axis (q - ref))
+
+Along each joint Gamma = ... + armature qdd + damping qd + frictionloss sign(qd) + stiffness (q - springref). Relations of joints and of fixed tendons
+that are linear are solved, exactly, for joints that no actuator drives. MuJoCo reads a text that names no file (`mjcf_text`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from symgen.description.mjcf_text import Mjcf, reduced
+from symgen.description.robot import Robot
+from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, Array, Inertial, Joint, Relation, Tree
+from symgen.description.tree_robot import robot_of_tree
+from symgen.description.xml_text import LARGEST
+from symgen.errors import DescriptionError
+
+FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
+JOINT_RELATION = 2  # mjtEq; the others left in the text are relations of tendons
+
+_Row = dict[int, Fraction]  # {joint: coefficient}
+_Solved = tuple[_Row, Fraction]  # a row and a constant
+
+
+def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False) -> tuple[Robot, tuple[str, ...]]:
+    """The robot of an MJCF file, and notes: which joint is which q, which body or site is which kept frame, and what was not read.
+
+    Parameters
+    ----------
+    content, file : bytes and name of the file.
+    keep_fixed : bodies without joints, and sites, are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else bodies are only
+        part of the body that holds them, to which their inertia belongs either way, and sites are left out.
+
+    Raises
+    ------
+    DescriptionError : no MJCF, or no tree of hinges and slides on a resting base; names file and line.
+    """
+    try:
+        mjcf = reduced(content)
+        tree = _tree(_compiled(mjcf), mjcf, sites=keep_fixed)
+        return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
+    except DescriptionError as error:
+        raise DescriptionError(error.message, path=error.path, file=file, line=error.line or 1) from error.__cause__
+
+
+def _compiled(mjcf: Mjcf) -> Any:
+    try:
+        import mujoco
+    except ImportError as error:
+        raise DescriptionError("MJCF is read by MuJoCo: pip install symgen[mjcf]") from error
+    try:
+        return mujoco.MjModel.from_xml_string(mjcf.text)
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise DescriptionError(f"MuJoCo refuses the file: {said.removeprefix('XML Error: ').removeprefix('Error: ')[:300]}") from error
+
+
+@dataclass
+class _Growing:
+    """The tree as it grows: for each body its link, and the pose (4, 4) of the body in the frame of that link."""
+
+    model: Any
+    mjcf: Mjcf
+    names: list[str]  # of the joints
+    links: dict[str, Inertial | None] = field(default_factory=lambda: {"world": None})
+    bare: set[str] = field(default_factory=set)
+    joints: list[Joint] = field(default_factory=list)
+    place: dict[int, tuple[str, Array]] = field(default_factory=lambda: {0: ("world", np.eye(4))})
+
+
+def _tree(model: Any, mjcf: Mjcf, *, sites: bool) -> Tree:
+    if model.njnt > MAX_JOINTS:
+        raise DescriptionError(f"{model.njnt} joints; at most {MAX_JOINTS} are read")
+    for values in (model.body_pos, model.body_mass, model.body_inertia, model.jnt_pos, model.qpos0, model.dof_damping, model.dof_armature):
+        if not np.all(np.abs(values) <= LARGEST):
+            raise DescriptionError(f"a number is not finite or larger than {LARGEST:g}")
+    growing = _Growing(model, mjcf, _joint_names(model))
+    for b in range(1, model.nbody):
+        _body(growing, b)
+    if sites:
+        for s in range(model.nsite):
+            link, pose = growing.place[int(model.site_bodyid[s])]
+            name = _new(growing, _named(model.site(s).name, "site", s))
+            growing.links[name] = None
+            growing.joints.append(_fixed(name, link, pose @ _pose(model.site_pos[s], model.site_quat[s])))
+    gx, gy, gz = (0.0 if mjcf.weightless else float(x) + 0.0 for x in model.opt.gravity)
+    notes = (*mjcf.notes, *_left_out(model))
+    return Tree(mjcf.name, growing.links, tuple(growing.joints), "world", _relations(growing), frozenset(growing.bare), (gx, gy, gz), notes)
+
+
+def _named(name: str, what: str, k: int) -> str:
+    return name or f"{what}{k}"
+
+
+def _joint_names(model: Any) -> list[str]:
+    """Names of the joints, those without one by their number, each once."""
+    given = {model.joint(k).name for k in range(model.njnt)}
+    names = []
+    for k in range(model.njnt):
+        name = model.joint(k).name or f"joint{k}"
+        while not model.joint(k).name and name in given:
+            name += "_"
+        names.append(name)
+    return names
+
+
+def _new(growing: _Growing, name: str) -> str:
+    """A name that no link has yet."""
+    while name in growing.links:
+        name += "_"
+    return name
+
+
+def _fixed(name: str, parent: str, pose: Array) -> Joint:
+    return Joint(f"{name} (fixed)", FIXED_TYPE, parent, name, pose, np.array([0.0, 0.0, 1.0]), 1)
+
+
+def _pose(position: Array, quaternion: Array) -> Array:
+    """(4, 4) of a position and a unit quaternion w, x, y, z."""
+    w, x, y, z = (float(c) for c in quaternion / np.linalg.norm(quaternion))
+    T = np.eye(4)
+    T[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    T[:3, 3] = position
+    return T
+
+
+def _body(growing: _Growing, b: int) -> None:
+    """The links of body b: one for each of its joints, or one that is fixed."""
+    model = growing.model
+    name = _new(growing, _named(model.body(b).name, "body", b))
+    link, pose = growing.place[int(model.body_parentid[b])]
+    pose = pose @ _pose(model.body_pos[b], model.body_quat[b])
+    first, count = int(model.body_jntadr[b]), int(model.body_jntnum[b])
+    if not count:
+        growing.joints.append(_fixed(name, link, pose))
+        pose, link = np.eye(4), name
+    for k in range(first, first + count):
+        child = name if k == first + count - 1 else _new(growing, f"{name} before {growing.names[k + 1]}")
+        joint, pose = _joint(growing, k, link, child, pose)
+        growing.joints.append(joint)
+        growing.links[child] = None
+        growing.bare |= {child} if child != name else set()
+        link = child
+    M, inertia = float(model.body_mass[b]), np.diag(model.body_inertia[b])
+    has = M > 0 or inertia.any()
+    growing.links[name] = Inertial(M, pose @ _pose(model.body_ipos[b], model.body_iquat[b]), inertia) if has else None
+    growing.place[b] = (link, pose)
+
+
+def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> tuple[Joint, Array]:
+    """Joint k on `parent`, where the body has `pose` at q = ref; the pose of the body in the frame of the joint."""
+    model, line = growing.model, growing.mjcf.joints[k]
+    name, kind = growing.names[k], int(model.jnt_type[k])
+    if kind in (FREE, BALL):
+        what = "free joint" if kind == FREE else "ball joint"
+        hint = "the base rests here: remove it" if kind == FREE else "write three hinges"
+        raise DescriptionError(f"{what} {name!r}: hinge and slide joints are read; {hint}", line=line)
+    dof, axis = int(model.jnt_dofadr[k]), np.array(model.jnt_axis[k]) / np.linalg.norm(model.jnt_axis[k])
+    anchor = _pose(model.jnt_pos[k], np.array([1.0, 0.0, 0.0, 0.0]))
+    ref = float(model.qpos0[int(model.jnt_qposadr[k])])
+    back = np.eye(4)  # from q = ref to q = 0
+    if kind == SLIDE:
+        back[:3, 3] = -ref * axis
+    else:
+        back = _pose(np.zeros(3), np.array([np.cos(ref / 2), *(-np.sin(ref / 2) * axis)]))
+    limits: dict[str, float] = {}
+    if model.jnt_limited[k]:
+        limits |= {"lower": float(model.jnt_range[k][0]), "upper": float(model.jnt_range[k][1])}
+    if model.jnt_actfrclimited[k]:
+        limits["effort"] = float(np.abs(model.jnt_actfrcrange[k]).min())
+    found = Joint(
+        name,
+        "prismatic" if kind == SLIDE else "revolute",
+        parent,
+        child,
+        pose @ anchor @ back,
+        axis,
+        line,
+        limits,
+        damping=float(model.dof_damping[dof]),
+        friction=float(model.dof_frictionloss[dof]),
+        armature=float(model.dof_armature[dof]),
+        stiffness=float(model.jnt_stiffness[k]),
+        rest=float(model.qpos_spring[int(model.jnt_qposadr[k])]),
+    )
+    return found, np.linalg.inv(anchor)
+
+
+def _left_out(model: Any) -> list[str]:
+    """Forces that a Robot has no place for, by name."""
+    notes = []
+    if names := [model.body(b).name for b in range(model.nbody) if model.body_gravcomp[b]]:
+        notes.append(f"gravcomp not read: {', '.join(f'{name!a:.60}' for name in names[:20])}")
+    for what, polynomial in (
+        ("damping that grows with speed", "dof_dampingpoly"),
+        ("stiffness that grows with deflection", "jnt_stiffnesspoly"),
+    ):
+        rows = getattr(model, polynomial, ())  # since MuJoCo 4; every joint has one degree of freedom
+        if names := [model.joint(k).name for k, row in enumerate(rows) if np.any(row)]:
+            notes.append(f"{what} not read: {', '.join(f'{name!a:.60}' for name in names[:20])}")
+    forces = [model.tendon_stiffness, model.tendon_damping, model.tendon_frictionloss, *(getattr(model, "tendon_armature", ()),)]
+    acting = sorted({int(t) for force in forces for t in np.flatnonzero(force)})
+    if acting:
+        notes.append(f"forces of tendons not read: {', '.join(ascii(model.tendon(t).name) for t in acting[:20])}")
+    return notes
+
+
+# --- relations --------------------------------------------------------------------------------------------------------
+
+
+def _relations(growing: _Growing) -> dict[str, Relation]:
+    """The joints that linear relations determine, by the others: exact elimination of joints that no actuator drives."""
+    model, names, driven = growing.model, growing.names, growing.mjcf.driven
+    found: dict[int, _Solved] = {}
+    for e in range(model.neq):
+        row, right = _equation(model, e)
+        for k in sorted(row.keys() & found.keys()):
+            row, right = _without(row, right, k, found[k])
+        free = [k for k in sorted(row) if names[k] not in driven]
+        if not free:
+            raise DescriptionError(f"equality {model.equality(e).name!r}: it ties driven joints, or says what others say already")
+        first = int(model.eq_obj1id[e])
+        pivot = first if int(model.eq_type[e]) == JOINT_RELATION and first in free else free[-1]
+        own = row.pop(pivot)
+        solved = ({k: -c / own for k, c in row.items()}, right / own)
+        found = {
+            k: (_with(leaders, offset, pivot, solved) if pivot in leaders else (leaders, offset)) for k, (leaders, offset) in found.items()
+        }
+        found[pivot] = solved
+    return {names[k]: Relation({names[i]: c for i, c in leaders.items()}, offset) for k, (leaders, offset) in sorted(found.items())}
+
+
+def _with(row: _Row, offset: Fraction, k: int, solved: _Solved) -> _Solved:
+    """sum of c_i q_i + offset with q_k put in."""
+    factor, (leaders, shift) = row[k], solved
+    indices = (row.keys() | leaders.keys()) - {k}
+    new = {i: row.get(i, Fraction(0)) + factor * leaders.get(i, Fraction(0)) for i in indices}
+    return {i: c for i, c in sorted(new.items()) if c}, offset + factor * shift
+
+
+def _without(row: _Row, right: Fraction, k: int, solved: _Solved) -> _Solved:
+    """sum of c_i q_i = right with q_k put in."""
+    left, moved = _with(row, Fraction(0), k, solved)
+    return left, right - moved
+
+
+def _equation(model: Any, e: int) -> _Solved:
+    """Relation e as sum of c_k q_k = c:  y1 - y1_0 = a0 + a1 (y2 - y2_0), y a joint position or the length of a fixed tendon."""
+    kind, name = int(model.eq_type[e]), model.equality(e).name
+    a0, a1, *higher = (Fraction(repr(float(x))) for x in model.eq_data[e][:5])
+    if any(higher):
+        raise DescriptionError(
+            f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]}; linear relations are read: a0 + a1 y"
+        )
+    row, right = _length(model, kind, int(model.eq_obj1id[e]))
+    right += a0
+    if int(model.eq_obj2id[e]) >= 0:
+        other, reference = _length(model, kind, int(model.eq_obj2id[e]))
+        row = {k: c for k in sorted(row.keys() | other.keys()) if (c := row.get(k, Fraction(0)) - a1 * other.get(k, Fraction(0)))}
+        right -= a1 * reference
+    return row, right
+
+
+def _length(model: Any, kind: int, k: int) -> _Solved:
+    """A joint position, or the length of a fixed tendon, as {joint: coefficient}, and its value at ref."""
+    reference = [Fraction(repr(float(model.qpos0[int(i)]))) for i in model.jnt_qposadr]
+    if kind == JOINT_RELATION:
+        return {k: Fraction(1)}, reference[k]
+    first, count = int(model.tendon_adr[k]), int(model.tendon_num[k])
+    row = {int(model.wrap_objid[w]): Fraction(repr(float(model.wrap_prm[w]))) for w in range(first, first + count)}
+    return row, sum((c * reference[i] for i, c in row.items()), start=Fraction(0))

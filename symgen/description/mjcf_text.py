@@ -1,0 +1,185 @@
+"""MJCF text, reduced to what the mechanism needs before MuJoCo sees it: no file is opened, nothing is multiplied, nothing is drawn.
+
+Kept are compiler and option settings, defaults of joints and geoms, bodies with their joints, inertials and those geoms whose mass matters, sites, and
+the equality constraints of joints and tendons. Elements that stand for many others (replicate, composite, flexcomp, attach, include, plugins) are refused by name;
+assets, sensors, contacts, cameras and the rest are left out. Geoms of bodies that have an <inertial>, or never move, are left out too; a mass
+that only a mesh would tell is refused. Actuators are read here: the names of the joints they drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from xml.sax.saxutils import quoteattr
+
+from symgen.description.xml_text import Element, read_elements
+from symgen.errors import DescriptionError
+
+MAX_DEPTH, MAX_BODIES = 150, 400
+_TURNED = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
+KEPT: dict[str, tuple[str, ...]] = {  # element: its attributes that matter
+    "mujoco": ("model",),
+    "compiler": ("angle", "eulerseq", "autolimits", "boundmass", "boundinertia", "balanceinertia", "inertiafromgeom", "inertiagrouprange"),
+    "option": ("gravity",),
+    "default": ("class",),
+    "worldbody": (),
+    "body": ("name", "childclass", "gravcomp", *_TURNED),
+    "frame": ("name", "childclass", *_TURNED),
+    "inertial": ("mass", "diaginertia", "fullinertia", *_TURNED),
+    "joint": ("name", "class", "type", "pos", "axis", "range", "limited", "stiffness", "springdamper", "springref", "ref", "armature", "damping",
+              "frictionloss", "actuatorfrcrange", "actuatorfrclimited"),
+    "freejoint": ("name",),
+    "geom": ("name", "class", "type", "size", "fromto", "mass", "density", "shellinertia", "group", *_TURNED),
+    "site": ("name", "type", "size", "fromto", *_TURNED),
+}  # fmt: skip
+RELATIONS: dict[str, tuple[str, ...]] = {
+    "joint": ("name", "joint1", "joint2", "polycoef", "active"),
+    "tendon": ("name", "tendon1", "tendon2", "polycoef", "active"),
+}
+TEXTS = ("name", "class", "childclass", "joint", "joint1", "joint2", "tendon1", "tendon2", "model")
+FIXED_TENDON = ("name", "stiffness", "damping", "frictionloss", "armature", "springlength")
+MANY = ("replicate", "composite", "flexcomp", "flex", "attach", "include", "plugin", "extension")
+SECTIONS = ("compiler", "option", "default", "worldbody", "equality", "tendon")
+IGNORED = ("actuator", "asset", "contact", "custom", "deformable", "keyframe", "sensor", "size", "statistic", "visual")
+
+
+@dataclass
+class Mjcf:
+    """Name of the model and the reduced text; lines of the joints in the order of the file, names of driven joints, and what was left out."""
+
+    name: str
+    text: str = ""
+    weightless: bool = False  # gravity is switched off
+    joints: list[int] = field(default_factory=list)
+    bodies: int = 0
+    driven: frozenset[str] = frozenset()
+    notes: tuple[str, ...] = ()
+
+
+def reduced(content: bytes) -> Mjcf:
+    """The part of an MJCF file that makes its mechanism; DescriptionError, with the line, of what is no plain MJCF."""
+    root = read_elements(content, MAX_DEPTH)
+    if root.tag != "mujoco":
+        hint = "; a URDF is read from a file that ends in .urdf" if root.tag == "robot" else ""
+        raise DescriptionError(f"found <{root.tag[:40]}>; expected <mujoco>{hint}", line=root.line)
+    for e in _every(root):
+        if e.tag in MANY:
+            raise DescriptionError(f"<{e.tag}> is not read; write out what it stands for, as MuJoCo's saved XML does", line=e.line)
+    for e in (e for e in root.children if e.tag == "compiler"):
+        if e.number("settotalmass", "-1") > 0:
+            raise DescriptionError("settotalmass is not read; write the masses out, as MuJoCo's saved XML does", line=e.line)
+    found = Mjcf(root.attributes.get("model", ""))
+    always = any(e.attributes.get("inertiafromgeom") == "true" for e in root.children if e.tag == "compiler")
+    parts = [_open(root, KEPT["mujoco"])]
+    for e in (e for section in SECTIONS for e in root.children if e.tag == section):
+        if e.tag == "worldbody":
+            parts += ["<worldbody>", *_inside(e, found, moves=False, weighed=False, always=always), "</worldbody>"]
+        elif e.tag == "equality":
+            parts += ["<equality>", *_relations(e), "</equality>"]
+        elif e.tag == "tendon":
+            parts += ["<tendon>", *_tendons(e), "</tendon>"]
+        elif e.tag == "default":
+            parts += _default(e)
+        else:
+            parts.append(_open(e, KEPT[e.tag], end="/"))
+    found.text = "".join([*parts, "</mujoco>"])
+    flags = {
+        key: value for e in root.children if e.tag == "option" for x in e.children if x.tag == "flag" for key, value in x.attributes.items()
+    }
+    found.weightless = flags.pop("gravity", "enable") == "disable"
+    driven = (x for e in root.children if e.tag == "actuator" for x in e.children)
+    found.driven = frozenset(name for x in driven for key in ("joint", "jointinparent") if (name := x.attributes.get(key)))
+    left = [f"<{tag}>" for tag in sorted({e.tag for e in root.children} & set(IGNORED))]
+    left += [f"flag {key[:30]}" for key, value in sorted(flags.items()) if value != "enable"]
+    found.notes = (f"not read: {', '.join(left)}",) if left else ()
+    if unknown := sorted({e.tag for e in root.children} - set(SECTIONS) - set(IGNORED)):
+        raise DescriptionError(f"<{unknown[0][:40]}> is no part of an MJCF file", line=root.line)
+    return found
+
+
+def _every(e: Element) -> Iterator[Element]:
+    yield e
+    for child in e.children:
+        yield from _every(child)
+
+
+def _open(e: Element, attributes: Iterable[str], end: str = "") -> str:
+    kept = {key: e.attributes[key] for key in attributes if key in e.attributes}
+    for key, value in kept.items():
+        if key not in TEXTS and any(word.strip("+-")[:3].lower() in ("nan", "inf") for word in value.split()):
+            raise DescriptionError(f"<{e.tag} {key}={value[:60]!r}>: expected finite numbers", line=e.line)
+    return f"<{e.tag}{''.join(f' {key}={quoteattr(value)}' for key, value in kept.items())}{end}>"
+
+
+def _default(e: Element) -> list[str]:
+    parts = [_open(e, KEPT["default"])]
+    for child in e.children:
+        if child.tag == "default":
+            parts += _default(child)
+        elif child.tag in ("joint", "geom"):
+            parts.append(_open(child, [key for key in KEPT[child.tag] if key not in ("name", "class")], end="/"))
+    return [*parts, "</default>"]
+
+
+def _inside(e: Element, found: Mjcf, *, moves: bool, weighed: bool, always: bool) -> list[str]:
+    """What stands in a body, a frame or the world; `weighed`: its geoms tell its mass, `always`: those of every body that moves."""
+    parts: list[str] = []
+    for child in e.children:
+        if child.tag == "body":
+            parts += _body(child, found, moves=moves, always=always)
+        elif child.tag == "frame":
+            parts += [_open(child, KEPT["frame"]), *_inside(child, found, moves=moves, weighed=weighed, always=always), "</frame>"]
+        elif child.tag in ("joint", "freejoint"):
+            found.joints.append(child.line)
+            parts.append(_open(child, KEPT[child.tag], end="/"))
+        elif child.tag in ("inertial", "site") or (child.tag == "geom" and weighed):
+            if child.tag == "geom" and any(key in child.attributes for key in ("mesh", "hfield")):
+                raise DescriptionError("the mass of this body would come from a mesh, which is not read; add <inertial>", line=child.line)
+            parts.append(_open(child, KEPT[child.tag], end="/"))
+    return parts
+
+
+def _body(e: Element, found: Mjcf, *, moves: bool, always: bool) -> list[str]:
+    found.bodies += 1
+    if found.bodies > MAX_BODIES:
+        raise DescriptionError(f"more than {MAX_BODIES} bodies", line=e.line)
+    here = {child.tag for child in _here(e)}
+    moves = moves or bool(here & {"joint", "freejoint"})
+    inside = _inside(e, found, moves=moves, weighed=moves and (always or "inertial" not in here), always=always)
+    return [_open(e, KEPT["body"]), *inside, "</body>"]
+
+
+def _here(e: Element) -> Iterator[Element]:
+    """Children of a body, those inside its frames too."""
+    for child in e.children:
+        yield child
+        if child.tag == "frame":
+            yield from _here(child)
+
+
+def _relations(e: Element) -> list[str]:
+    parts = []
+    for child in e.children:
+        if child.attributes.get("active") == "false":
+            continue
+        if child.tag not in RELATIONS:
+            name = child.attributes.get("name", "")
+            raise DescriptionError(
+                f"<{child.tag[:30]}> {name[:40]!r} in <equality>: joint and tendon relations are read, closed loops and ties between bodies not; "
+                "describe the loop by cut and twin in a robot file",
+                line=child.line,
+            )
+        parts.append(_open(child, RELATIONS[child.tag], end="/"))
+    return parts
+
+
+def _tendons(e: Element) -> list[str]:
+    """Fixed tendons: sums of joint positions, which relations may tie."""
+    parts = []
+    for child in (child for child in e.children if child.tag == "fixed"):
+        parts += [
+            _open(child, FIXED_TENDON),
+            *(_open(x, ("joint", "coef"), end="/") for x in child.children if x.tag == "joint"),
+            "</fixed>",
+        ]
+    return parts
