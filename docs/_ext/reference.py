@@ -242,9 +242,9 @@ def robot(name: str) -> str:
     formulas = "\n".join(f"{b.name} = {b.formula}" for b in gathered[:3])
     return "\n".join(
         [
-            f"## {name}", "", f"{verbatim(description.title or name)}. {len(description.joints)} actuated joints, {len(description.frames)} frames, "
+            f"## {name}", "", f"{verbatim(description.title or name)}. Actuated joints: {len(description.joints)}; frames: {len(description.frames)}; "
             f"{len(regrouping)} base parameters of {len(description.parameters)}.", "",
-            f'<p><a href="../robots/{name}.html">{name}: skeleton, frames and all {len(gathered)} formulas</a></p>', "",
+            f'<p><a href="../robots/{name}.html">{name}: skeleton, frames, formulas</a></p>', "",
             f"```text\n{formulas}\n```" if formulas else "", "", verbatim(" ".join((description.source or "").split())), "",
         ]
     )  # fmt: skip
