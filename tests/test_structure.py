@@ -43,6 +43,7 @@ ONLY_IN = {  # library: files and folders that may import it
 LAZY = {  # pooch and its requests are loaded only for a dataset, numpy only for a URDF, the text of pages only in a notebook
     "runtime.io.records": {"runtime.io.datasets"},
     "symgen.description.files": {"symgen.description.urdf", "symgen.description.mjcf"},
+    "symgen.regroup": {"symgen.regroup.regrouping"},
     "symgen.regroup.regrouping": {"symgen.report.notebook"},
 }
 FORBIDDEN_CALLS = {"eval", "exec", "sympify", "parse_expr", "__import__"}
