@@ -34,7 +34,9 @@ def record_errors(data: Observation | Reduction, fit: Estimate, names: Sequence[
     for k, name in enumerate(names):
         residual, size, rows = _of_rows(own, fit.X, k) if isinstance(own, Observation) else _of_factors(own, fit.X, k)
         found.append(
-            RecordError(name, rows, _percent(float(np.linalg.norm(residual)), float(np.linalg.norm(size))), tuple(map(_percent, residual, size)))
+            RecordError(
+                name, rows, _percent(float(np.linalg.norm(residual)), float(np.linalg.norm(size))), tuple(map(_percent, residual, size))
+            )
         )
     return tuple(found)
 

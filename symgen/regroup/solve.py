@@ -64,7 +64,9 @@ def coefficients(robot: Robot, supports: Supports) -> dict[str, list[Expression]
             result |= recognition.coefficients()
     for name in supports:
         if name not in result:
-            raise SymgenError(f"robot {robot.name}: {name} depends on {', '.join(supports[name])}, but the coefficients were not recognised: {reasons[name]}")
+            raise SymgenError(
+                f"robot {robot.name}: {name} depends on {', '.join(supports[name])}, but the coefficients were not recognised: {reasons[name]}"
+            )
     return {name: result.get(name, []) for name in supports}
 
 
