@@ -29,10 +29,17 @@ ROOT = Path(__file__).resolve().parents[2]
 SHOWN = ("index.html", "guide/my_robot.html", "theory/cestac.html", "reference/gallery.html", "reference/study_file.html", "api/index.html")
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def test_site(tmp_path: Path) -> None:
+    """One test, since each process that tests would build a site of its own."""
+    site = built(tmp_path)
+    links_and_addresses(site)
+    every_public_function_and_class_is_described(site)
+    references_hold_every_verb_and_every_section(site)
+    pages_in_a_browser_ask_for_files_of_the_site_alone(site)
+
+
+def built(out: Path) -> Path:
     """The site, built with warnings as errors."""
-    out = tmp_path_factory.mktemp("site")
     command = [
         sys.executable,
         "-m",
@@ -46,8 +53,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         str(ROOT / "docs"),
         str(out / "html"),
     ]
-    built = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
-    assert built.returncode == 0, built.stderr[-4000:]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    assert ended.returncode == 0, ended.stderr[-4000:]
     return out / "html"
 
 
@@ -73,7 +80,7 @@ class Addresses(HTMLParser):
             self.fetched.append(str(given["src"]))
 
 
-def test_site_builds_links_and_fetches_nothing(site: Path) -> None:
+def links_and_addresses(site: Path) -> None:
     pages = {page: Addresses(page.read_text(encoding="utf-8")) for page in site.rglob("*.html")}
     assert {f"{name}.html" for name in packaged_robots()} == {page.name for page in (site / "robots").iterdir()}
     for page, addresses in pages.items():
@@ -89,7 +96,7 @@ def test_site_builds_links_and_fetches_nothing(site: Path) -> None:
                 assert unquote(parts.fragment) in pages[target].anchors | {""}, f"{page.relative_to(site)} links to {address}"
 
 
-def test_every_public_function_and_class_is_described(site: Path) -> None:
+def every_public_function_and_class_is_described(site: Path) -> None:
     from sphinx.util.inventory import InventoryFile
 
     with (site / "objects.inv").open("rb") as file:
@@ -107,7 +114,7 @@ def test_every_public_function_and_class_is_described(site: Path) -> None:
                     assert f"{found.name}.{name}" in known, f"{found.name}.{name} is on no page of docs/api"
 
 
-def test_references_hold_every_verb_and_every_section(site: Path) -> None:
+def references_hold_every_verb_and_every_section(site: Path) -> None:
     commands = (site / "reference" / "commands.html").read_text(encoding="utf-8")
     study = (site / "reference" / "study_file.html").read_text(encoding="utf-8")
     for verb in VERBS:
@@ -117,7 +124,7 @@ def test_references_hold_every_verb_and_every_section(site: Path) -> None:
     assert "<!-- generated" not in commands + study
 
 
-def test_pages_in_a_browser_ask_for_files_of_the_site_alone(site: Path) -> None:
+def pages_in_a_browser_ask_for_files_of_the_site_alone(site: Path) -> None:
     try:
         executable = find_browser()
     except BrowserError as e:
