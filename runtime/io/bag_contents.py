@@ -9,15 +9,17 @@ from __future__ import annotations
 import re
 import sqlite3
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from runtime.errors import InputError
 from runtime.io.limits import Unpacker, require_size, unpacked
-from runtime.io.yaml_text import LONGEST, yaml_values
 
-CHUNK, FOOTER = 0x06, 0x02  # types of MCAP records
+CHANNEL, CHUNK, FOOTER = 0x04, 0x06, 0x02  # types of MCAP records
+FOOTER_SIZE = 37  # bytes of that record and of the mark behind it
+LONGEST_TOPICS = 250_000  # characters, all topics together
+MOST_BRACKETS = 500  # open brackets, all topics together: recorders write none
 RECORD = struct.Struct("<BQ")
 SIZES = struct.Struct("<QQQII")  # start, end, size unpacked, crc, length of the name of the compression
 MAGIC = 8  # bytes ahead of the first record
@@ -28,9 +30,42 @@ Chunks = dict[int, tuple[str, int, int]]  # by place in the file: compression, s
 
 
 def mcap_chunks(path: Path, unpackers: Mapping[str, Callable[[], Unpacker]]) -> Chunks:
-    """The chunks of an MCAP file; raises InputError where one unpacks to another size than it says, or all to more than a record holds."""
+    """The chunks of an MCAP file; raises InputError where one unpacks to another size than it says, or all to more than a record holds.
+
+    Every record that a reader may come to is looked at: the summary that the last record, the footer, leads to has to begin with one of them.
+    """
     size, total = path.stat().st_size, 0
     chunks: Chunks = {}
+    channels: set[bytes] = set()
+    places, footer = {0}, b""
+    for place, kind, content in _records(path, size):
+        places.add(place)
+        if kind == CHANNEL:
+            channels.add(content)
+        elif kind == FOOTER:
+            footer = content if place == size - FOOTER_SIZE else b""
+        elif kind == CHUNK:
+            _, _, said, _, letters = SIZES.unpack_from(content)
+            start = SIZES.size + letters
+            compression = content[SIZES.size : start].decode("ascii", "replace")
+            (packed,) = struct.unpack_from("<Q", content, start)
+            require_size(total + said, size, path.name)
+            data = content[start + 8 : start + 8 + packed]
+            if compression in unpackers:
+                data = unpacked(unpackers[compression](), data, said)
+            if len(data) != said:
+                raise InputError(f"a chunk at byte {place} that does not unpack to the {said} bytes it says", file=path.name)
+            total += said
+            chunks[place] = (compression, packed, said)
+            channels |= _channels(data)
+    if not footer or struct.unpack_from("<Q", footer)[0] not in places:
+        raise InputError("not a whole MCAP file: its last record does not lead to a summary; repair it with `mcap recover`", file=path.name)
+    _require_descriptions(channels, path.name)
+    return chunks
+
+
+def _records(path: Path, size: int) -> Iterator[tuple[int, int, bytes]]:
+    """Place, type and content of the records up to the footer; of messages, attachments and the like no content."""
     with path.open("rb") as stream:
         stream.seek(MAGIC)
         while len(head := stream.read(RECORD.size)) == RECORD.size:
@@ -38,24 +73,35 @@ def mcap_chunks(path: Path, unpackers: Mapping[str, Callable[[], Unpacker]]) -> 
             place = stream.tell() - RECORD.size
             if length > size - stream.tell():
                 raise InputError(f"ends within a record at byte {place}; it was cut short, or recording was", file=path.name)
-            if kind == FOOTER:
-                break
-            if kind != CHUNK:
+            if kind in (CHUNK, CHANNEL, FOOTER):
+                yield place, kind, stream.read(length)
+            else:
                 stream.seek(length, 1)
-                continue
-            content = stream.read(length)
-            _, _, said, _, letters = SIZES.unpack_from(content)
-            start = SIZES.size + letters
-            compression = content[SIZES.size : start].decode("ascii", "replace")
-            (packed,) = struct.unpack_from("<Q", content, start)
-            require_size(total + said, size, path.name)
-            if compression in unpackers:
-                data = unpacked(unpackers[compression](), content[start + 8 : start + 8 + packed], said)
-                if len(data) != said:
-                    raise InputError(f"a chunk at byte {place} that does not unpack to the {said} bytes it says", file=path.name)
-            total += said
-            chunks[place] = (compression, packed, said)
-    return chunks
+                yield place, kind, b""
+            if kind == FOOTER:
+                return
+
+
+def _channels(data: bytes) -> set[bytes]:
+    """Contents of the channel records of a chunk."""
+    found, place = set(), 0
+    while place + RECORD.size <= len(data):
+        kind, length = RECORD.unpack_from(data, place)
+        place += RECORD.size
+        if kind == CHANNEL:
+            found.add(data[place : place + length])
+        place += length
+    return found
+
+
+def _require_descriptions(texts: Iterable[bytes], file: str) -> None:
+    """Raise InputError where the topics are described at such length, or nested so deeply, that their quality of service takes long to read."""
+    length = brackets = 0
+    for text in texts:
+        length += len(text)
+        brackets += len(re.findall(rb"[\[{?]", text))
+        if length > LONGEST_TOPICS or brackets > MOST_BRACKETS:
+            raise InputError("topics described by more than a recorder writes; filter the bag for the topic of its joint states", file=file)
 
 
 def require_plain_tables(path: Path) -> None:
@@ -69,6 +115,9 @@ def require_plain_tables(path: Path) -> None:
                 computed = [column[1] for column in bag.execute(f'PRAGMA table_xinfo("{str(name).lower()}")') if column[6] != 0]
                 if kind != "table" or computed or re.match(r"\s*create\s+virtual", str(text), re.IGNORECASE):
                     raise InputError(f"{name} is not a table of stored values; expected the database of a ROS 2 bag", file=path.name)
+            if bag.execute("SELECT count(*) FROM pragma_table_info('topics') WHERE name = 'offered_qos_profiles'").fetchone()[0]:
+                qos = bag.execute("SELECT substr(offered_qos_profiles, 1, ?) FROM topics", (LONGEST_TOPICS + 1,))
+                _require_descriptions((str(text).encode() for (text,) in qos), path.name)
         finally:
             bag.close()
     except (sqlite3.Error, UnicodeDecodeError) as e:
@@ -77,6 +126,8 @@ def require_plain_tables(path: Path) -> None:
 
 def storage_files(folder: Path) -> tuple[list[Path], str]:
     """Files of a ROS 2 bag, a folder with metadata.yaml, and how they are compressed: "", "file" or "message"."""
+    from runtime.io.yaml_text import LONGEST, yaml_values
+
     description = folder / "metadata.yaml"
     where = f"{folder.name}/metadata.yaml"
     if not description.is_file():

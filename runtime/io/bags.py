@@ -23,7 +23,7 @@ from typing import Any
 
 from runtime.errors import InputError
 from runtime.io.bag_contents import mcap_chunks, require_plain_tables, storage_files
-from runtime.io.files import sha256, sha256_of
+from runtime.io.files import require_file, sha256, sha256_of
 from runtime.io.joint_states import NANOSECONDS, JointState, JointTable
 from runtime.io.limits import Unpacker, allowed, require_size, unpacked
 
@@ -57,7 +57,7 @@ def read_bag(path: Path, topic: str | None = None) -> tuple[JointTable, str]:
     try:
         with TemporaryDirectory(prefix="symgen-bag-") as scratch:
             files, compression = storage_files(path) if path.is_dir() else ([path], "")
-            size = sum(file.stat().st_size for file in files)
+            size = sum(require_file(file) for file in files)
             stores = _uncompressed(rosbags, files, Path(scratch)) if compression == "file" else files
             with _opened(rosbags, stores) as readers:
                 name = _topic(readers, topic, path.name)

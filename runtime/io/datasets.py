@@ -19,7 +19,7 @@ from typing import Any
 import pooch
 
 from runtime.errors import DataUnavailableError, InputError
-from runtime.io.files import read_bytes, sha256
+from runtime.io.files import is_file, read_bytes, sha256
 
 TIMEOUT = 10.0  # s, for a connection and between two packets
 
@@ -146,7 +146,7 @@ def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[
     data = os.environ.get("SYMGEN_DATA")
     if data:
         for path in (Path(data) / name / file, Path(data) / name / f"{file}.gz"):
-            if path.is_file():
+            if is_file(path):
                 found = sha256(read_bytes(path))
                 if found != expected:
                     raise InputError(

@@ -13,9 +13,17 @@ from stat import S_ISDIR, S_ISREG
 from typing import BinaryIO, cast
 
 from runtime.errors import InputError
-from runtime.io.limits import allowed, require_size
+from runtime.io.limits import PART, require_size
 
 WHOLE = 2**31  # bytes of a file that is read into memory; larger ones are read by blocks
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a file of that name; False for names that no file can have."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def require_file(path: Path) -> int:
@@ -41,10 +49,13 @@ def read_bytes(path: Path) -> bytes:
     if data[:2] != b"\x1f\x8b":
         return data
     try:
+        parts, size = [], 0
         with gzip.GzipFile(fileobj=BytesIO(data)) as packed:
-            plain = packed.read(allowed(len(data)) + 1)
-        require_size(len(plain), len(data), str(path))
-        return plain
+            while part := packed.read(PART):
+                parts.append(part)
+                size += len(part)
+                require_size(size, len(data), str(path))
+        return b"".join(parts)
     except InputError:
         raise
     except (OSError, EOFError, zlib.error) as e:

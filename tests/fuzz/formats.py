@@ -462,8 +462,11 @@ def read_record(path: Path) -> object:
         else:
             if refused is None and not np.array_equal(np.concatenate(blocks), whole.q):  # type: ignore[attr-defined]
                 raise AssertionError("blocks and whole file differ")
-    if refused is not None:
-        raise refused
+    try:
+        if refused is not None:
+            raise refused
+    finally:
+        del refused  # an error that holds its own frame would hold what was read
     return whole
 
 

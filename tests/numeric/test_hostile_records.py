@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import os
 import re
 import shutil
 import sqlite3
@@ -55,7 +56,7 @@ def test_gzip_bomb(tmp_path):
     with gzip.open(tmp_path / "a.csv.gz", "wb", compresslevel=9) as packed:
         for _ in range(BEYOND // 2**20):
             packed.write(b"1\n" * 2**19)
-    refused(lambda: record(tmp_path / "a.csv.gz"), "unpacks to 16 MiB or more")
+    refused(lambda: record(tmp_path / "a.csv.gz"), "unpacks to 1[67] MiB or more")
 
 
 def test_zip_bomb_in_npz(tmp_path):
@@ -76,14 +77,17 @@ def test_npz_that_declares_more_than_it_holds(tmp_path):
 
 
 def mcap_with(chunk, compression, size, tail=b""):
-    """An unindexed MCAP file of one chunk that says it unpacks to `size` bytes."""
+    """An unindexed MCAP file of one chunk that says it unpacks to `size` bytes; tail : records after it."""
     name = compression.encode()
     content = struct.pack("<QQQII", 0, 0, size, 0, len(name)) + name + struct.pack("<Q", len(chunk)) + chunk
     header = struct.pack("<I", 4) + b"ros2" + struct.pack("<I", 0)
     footer = struct.pack("<QQI", 0, 0, 0)
-    records = ((1, header), (6, content), (2, footer))
     magic = b"\x89MCAP0\r\n"
-    return magic + b"".join(struct.pack("<BQ", kind, len(body)) + body for kind, body in records) + tail + magic
+    first, last = (
+        b"".join(struct.pack("<BQ", kind, len(body)) + body for kind, body in records)
+        for records in (((1, header), (6, content)), ((2, footer),))
+    )
+    return magic + first + tail + last + magic
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
@@ -177,6 +181,32 @@ def test_a_definition_of_its_own_is_refused(tmp_path):
     refused(lambda: read_bag(path), "defined otherwise")
 
 
+@pytest.mark.parametrize("qos", ["[" * 3000, "- a\n" * 100_000])
+def test_quality_of_service_that_takes_long_to_read(tmp_path, qos):
+    """In a table, in a channel of a chunk, in a channel of the summary."""
+    path = write_bag("bare db3", tmp_path / "run", MESSAGES)
+    with sqlite3.connect(path) as bag:
+        bag.execute("UPDATE topics SET offered_qos_profiles = ?", (qos,))
+    bag.close()
+    refused(lambda: read_bag(path), "described by more than a recorder writes")
+    text = qos.encode()
+    metadata = b"".join(struct.pack("<I", len(x)) + x for x in (b"offered_qos_profiles", text))
+    channel = struct.pack("<HH", 1, 0) + b"".join(struct.pack("<I", len(x)) + x for x in (b"/j", b"cdr", metadata))
+    record = struct.pack("<BQ", 4, len(channel)) + channel
+    for chunk, tail in ((record, b""), (b"", record)):
+        (tmp_path / "a.mcap").write_bytes(mcap_with(chunk, "", len(chunk), tail))
+        refused(lambda: read_bag(tmp_path / "a.mcap"), "described by more than a recorder writes")
+
+
+def test_mcap_summary_that_begins_nowhere(tmp_path):
+    """Within an attachment, say, where records would never have been looked at."""
+    path = write_bag("bare mcap", tmp_path / "run", MESSAGES)
+    data = bytearray(path.read_bytes())
+    struct.pack_into("<Q", data, len(data) - 28, 60)
+    path.write_bytes(data)
+    refused(lambda: read_bag(path), "does not lead to a summary")
+
+
 # --- names that lead elsewhere ------------------------------------------------------------------------------------------
 
 
@@ -207,12 +237,12 @@ LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (LAUGHS, "more than 100000 values"),
+        (LAUGHS, "anchors and aliases"),
         ("[" * 500_000, "nested deeper"),
-        ("[a, " * 199, "not YAML"),
-        ("- " * 2000, "not YAML"),
-        ("x: " + "1" * 2_000_000, "at most 1000000"),
-        ("!!python/object/apply:os.system [true]", "expected"),
+        ("[a, " * 199, "nested deeper"),
+        ("- " * 2000, "nested deeper"),
+        ("x: " + "1" * 2_000_000, "at most 500000"),
+        ("!!python/object/apply:os.system [true]", "tags"),
         ("rosbag2_bagfile_information: 1", "no mapping rosbag2_bagfile_information"),
         ("rosbag2_bagfile_information: {relative_file_paths: 5}", "names no file"),
         ("rosbag2_bagfile_information: {relative_file_paths: [x], compression_mode: file, compression_format: rar}", "compression 'rar'"),
@@ -223,6 +253,13 @@ def test_descriptions_of_bags(tmp_path, text, said):
     path = write_bag("sqlite3", tmp_path / "run", MESSAGES)
     (path / "metadata.yaml").write_text(text)
     refused(lambda: read_bag(path), said)
+
+
+def test_a_pipe_is_no_bag(tmp_path):
+    """It would never answer."""
+    for name in ("a.bag", "a.mcap", "a.db3"):
+        os.mkfifo(tmp_path / name)
+        refused(lambda name=name: read_bag(tmp_path / name), "a pipe or a device")
 
 
 # --- damaged files ------------------------------------------------------------------------------------------------------
