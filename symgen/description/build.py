@@ -10,7 +10,7 @@ from symgen.description.distal import khalil_frames
 from symgen.description.expression import ONE, Expression
 from symgen.description.forms import form_of, row_of
 from symgen.description.grammar import parse
-from symgen.description.robot import FIXED, Drives, Element, Form, Frame, Loop, Path, Robot, Row
+from symgen.description.robot import FIXED, Drives, Element, Form, Frame, Loop, Path, Robot, Row, check_identifier
 from symgen.description.schema import CONVENTIONS, DrivesTable, ElementTable, FrameRow, RobotFile
 from symgen.errors import DescriptionError, ExpressionError
 
@@ -19,6 +19,8 @@ T = TypeVar("T")
 
 def build(table: RobotFile, *, file: str, sha256: str) -> Robot:
     """The Robot of a robot file; DescriptionError carries the path of the field at fault."""
+    for name in table.constants:
+        check_identifier(name, ("constants", name))
     constants = set(table.constants)
     joints = {j for j, row in table.frames.items() if row.sigma != FIXED}
     variables = constants | {f"q{j}" for j in (*joints, *range(1, len(table.frames) + 1))}

@@ -14,6 +14,7 @@ of the link frame, MX MY MZ = M (centre of mass). SI and rad.
 
 from __future__ import annotations
 
+import builtins
 import keyword
 import re
 from collections.abc import Mapping
@@ -203,7 +204,8 @@ def parameter(family: str, j: int) -> str:
 
 # --- checks -----------------------------------------------------------------------------------------------------------
 
-ARGUMENTS = {"q", "qd", "qdd", "tau", "X", "D", "out", "frame", "standard", "np", "pi", "N", "B", "A"}
+ARGUMENTS = {"q", "qd", "qdd", "tau", "X", "D", "out", "frame", "standard", "np", "pi", "N", "B", "A", "array_namespace", *dir(builtins)}
+MARKS = ("\\", '"""', "*/", "/*", "??/")  # none of which a docstring, a comment of C (the last is \\ there) or LaTeX may meet
 RESERVED = {"CON", "PRN", "AUX", "NUL", *(f"{device}{k}" for device in ("COM", "LPT") for k in range(10))}
 
 
@@ -229,9 +231,9 @@ def check_identifier(name: str, path: Path) -> None:
 
 def _check_text(text: str, name: str) -> None:
     """Titles end up in docstrings and comments of emitted files: nothing in them may close one."""
-    if not text.isprintable() or len(text) > 1000 or text.endswith('"') or any(mark in text for mark in ("\\", '"""', "*/", "/*")):
+    if not text.isprintable() or len(text) > 1000 or text.endswith('"') or any(mark in text for mark in MARKS):
         raise DescriptionError(
-            f"{name} {text[:60]!r}: expected one line of printable text, at most 1000 characters, without \\, triple or final quotes, /* or */",
+            f"{name} {text[:60]!r}: expected one line of printable text, at most 1000 characters, without \\, triple or final quotes, /*, */ or ??/",
             path=(name,),
         )
 
@@ -282,9 +284,9 @@ def _check_names(robot: Robot) -> None:
     taken = names | {n + "R" for n in names} | ARGUMENTS
     for name in robot.constants:
         check_identifier(name, ("constants", name))
-        if name in taken or re.fullmatch(r"q\d+", name) or name.startswith("__"):
+        if name in taken or re.fullmatch(r"(q|QP|QDP)\d+", name):
             raise DescriptionError(
-                f"constant {name!r} is the name of a parameter, joint or argument; choose another", path=("constants", name)
+                f"constant {name!r} is the name of a parameter, joint, argument or builtin; choose another", path=("constants", name)
             )
     if len(names) != len(robot.parameters):
         double = sorted(n for n in names if robot.parameters.count(n) > 1)

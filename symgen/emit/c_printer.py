@@ -6,6 +6,7 @@ functions, then straight-line arithmetic, which they turn into vectors of any wi
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
@@ -19,6 +20,7 @@ short signed sizeof static struct switch typedef union unsigned void volatile wh
 MACROS = "asm typeof errno linux unix NULL NAN INFINITY HUGE_VAL TILE KERNEL PART STREAM PORTABLE WIDTH"
 OWN = "sin cos sqrt sign above below load save constants flags m t start row tile U V size_t int32_t int64_t memcpy memset"
 RESERVED = frozenset(f"{KEYWORDS} {MACROS} {OWN}".split())
+HEADERS = re.compile(r"(M|FP|HUGE|MATH|U?INT\w*|SIZE|PTRDIFF|SIG|WCHAR|WINT)_\w+")  # macros of math.h and stdint.h
 
 
 class CText(Text):
@@ -90,4 +92,4 @@ def _needed(outputs: Iterable[Node]) -> Iterator[int]:
 
 def identifier(name: str) -> str:
     """A name of the robot file as C accepts it beside the names of the kernel."""
-    return f"{name}_" if name in RESERVED else name
+    return f"{name}_" if name in RESERVED or HEADERS.fullmatch(name) else name

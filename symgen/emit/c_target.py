@@ -209,7 +209,7 @@ def layout(spec: CSpec) -> list[dict[str, object]]:
         found.append(
             {
                 **vars(k),
-                "tile_prototype": signature(f"KERNEL static void {k.name}_tile", tile),
+                "tile_prototype": signature(f"KERNEL static void {k.name}_lanes", tile),
                 "part_functions": _part_functions(k, n),
                 "tile_arguments": ", ".join(arguments),
                 "prototype": signature(f"int32_t {spec.robot.name}_{k.name}", own),

@@ -196,7 +196,7 @@ def test_quantities_have_the_names_of_the_numpy_module() -> None:
 @pytest.mark.parametrize("title", ["*/ int evil(void) { return 1; } /*", "a /* b */ c", "?\u202e?/ \\", "**/*/ */", "\n*/", "ends in \\"])
 def test_texts_stay_in_their_comment(title: str, tmp_path: Path) -> None:
     """A robot refuses most such titles itself; the command may hold any file name."""
-    robot = replace(load_robot("planar_2r"), title="??/ ** /?? *")
+    robot = replace(load_robot("planar_2r"), title="?? / ** / ?? *")
     text = generate_files(robot, targets=("c",), command=title)["planar_2r.c"]
     compiled(tmp_path, text, COMPILERS[0], [*FLAGS, "-O0", "-shared", "-fPIC"])
     comment, code = text.split("*/", 1)
