@@ -17,6 +17,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -26,6 +28,8 @@ PIPES = (  # Chromium reads commands on descriptor 3 and writes answers on 4
     "import fcntl, os, sys; r, w = (fcntl.fcntl(int(n), fcntl.F_DUPFD, 64) for n in sys.argv[1:3]); "
     "os.dup2(r, 3); os.dup2(w, 4); os.execvp(sys.argv[3], sys.argv[3:])"
 )
+
+FRAME = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 WEAK_CONTRAST = """(() => {
   const rgb = (c) => c.match(/[\\d.]+/g).map(Number);
@@ -49,6 +53,16 @@ def find_browser() -> str:
     if found is None:
         raise BrowserError(f"none of {', '.join(NAMES)} is on PATH")
     return found
+
+
+def started_browser() -> Browser:
+    """A browser; without one the test is skipped, or fails where SYMGEN_REQUIRE_BROWSER=1 says that it must run."""
+    try:
+        return Browser(find_browser())
+    except BrowserError as e:
+        if os.environ.get("SYMGEN_REQUIRE_BROWSER") == "1":
+            pytest.fail(f"SYMGEN_REQUIRE_BROWSER=1 but {e}")
+        pytest.skip(f"{e}; install chromium to run the tests in a browser")
 
 
 class Browser:
@@ -139,11 +153,11 @@ class Browser:
         return result["result"].get("value")
 
     def centre(self, selector: str) -> tuple[float, float]:
-        """Middle of an element, scrolled into view."""
-        return tuple(self.run(
-            f"(() => {{ const n = document.querySelector({json.dumps(selector)}); n.scrollIntoView({{block: 'center', behavior: 'instant'}});"
-            " const b = n.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
-        ))  # fmt: skip
+        """Middle of an element, scrolled into view and drawn there: a finger meets what was drawn last."""
+        self.run(f"document.querySelector({json.dumps(selector)}).scrollIntoView({{block: 'center', behavior: 'instant'}})")
+        self.run(FRAME)
+        box = f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()"
+        return tuple(self.run(f"(() => {{ const b = {box}; return [b.x + b.width / 2, b.y + b.height / 2]; }})()"))
 
     def hover(self, selector: str) -> None:
         x, y = self.centre(selector)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import os
 import pkgutil
 import re
 import subprocess
@@ -15,7 +14,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from browser import Browser, BrowserError, find_browser
+from browser import started_browser
 
 import runtime
 import symgen
@@ -125,13 +124,7 @@ def references_hold_every_verb_and_every_section(site: Path) -> None:
 
 
 def pages_in_a_browser_ask_for_files_of_the_site_alone(site: Path) -> None:
-    try:
-        executable = find_browser()
-    except BrowserError as e:
-        if os.environ.get("SYMGEN_REQUIRE_BROWSER") == "1":
-            pytest.fail(f"SYMGEN_REQUIRE_BROWSER=1 but {e}")
-        pytest.skip(f"{e}; install chromium to run the tests in a browser")
-    with Browser(executable) as browser:
+    with started_browser() as browser:
         for name in SHOWN:
             for width in (1280, 390):
                 browser.open(site / name, width, 800)

@@ -5,37 +5,16 @@ import re
 from base64 import b64encode
 from hashlib import sha256
 from html import unescape
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from report.strict_html import Strict
 
 from runtime.report.html import Image, Matrix, Number, Page, Section, Table, embedded, render
 from runtime.report.markup import element, formula, symbol
 from runtime.report.series import Series
 
 HOSTILE = "</style></script><script>alert('x')</script> & \"<img src=x onerror=alert(1)> {{ 7*7 }} <!-- ]]>"
-VOID = {"meta", "img"}
-
-
-class Strict(HTMLParser):
-    """Every start tag has its end tag, in order."""
-
-    def __init__(self, text):
-        super().__init__(convert_charrefs=True)
-        self.open, self.tags, self.attributes = [], [], []
-        self.feed(text)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append(tag)
-        self.attributes += [(tag, name, value) for name, value in attrs]
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open and self.open.pop() == tag, f"</{tag}> in {self.open}"
 
 
 def page(text, *, live=True):

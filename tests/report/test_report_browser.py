@@ -2,12 +2,11 @@
 
 import base64
 import json
-import os
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from browser import WEAK_CONTRAST, Browser, BrowserError, find_browser
+from browser import FRAME, WEAK_CONTRAST
 from typer.testing import CliRunner
 
 from runtime.model import load_model
@@ -16,20 +15,7 @@ from symgen.description import load_robot
 from symgen.emit import generate_module
 
 DRAWN = "[...document.querySelectorAll('.plot .line')].map((n) => n.getAttribute('d')).join('|')"
-FRAME = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 SPAN = "[...document.querySelectorAll('.plot')[0].querySelectorAll('text')].map((n) => n.textContent)"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    try:
-        started = Browser(find_browser())
-    except BrowserError as e:
-        if os.environ.get("SYMGEN_REQUIRE_BROWSER") == "1":
-            pytest.fail(f"SYMGEN_REQUIRE_BROWSER=1 but {e}")
-        pytest.skip(f"{e}; install chromium to run the tests in a browser")
-    with started as b:
-        yield b
 
 
 @pytest.fixture(scope="module")

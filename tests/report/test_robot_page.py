@@ -3,12 +3,12 @@
 import json
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from report.strict_html import Strict
 from typer.testing import CliRunner
 
 from oracles.named_robots import planar_2r
@@ -27,32 +27,7 @@ from symgen.report.page import embedded, robot_page
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 ROBOTS = ("tx40", "haptic", "scara", "four_bar")
-VOID = {"meta", "input", "br", "link", "img", "hr"}
 HOSTILE = "</script></title><script>alert('x')</script><img src=x onerror=alert(1)> {{ 7*7 }} & ' <!-- ]]> </style><b>"
-
-
-class Strict(HTMLParser):
-    """Every start tag has its end tag, in order; attributes and texts are kept."""
-
-    def __init__(self, text):
-        super().__init__(convert_charrefs=True)
-        self.open, self.tags, self.attributes, self.text = [], [], [], {}
-        self.feed(text)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append(tag)
-        self.attributes += [(tag, name, value) for name, value in attrs]
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open and self.open.pop() == tag, f"</{tag}> in {self.open}"
-
-    def handle_data(self, data):
-        if self.open:
-            self.text[self.open[-1]] = self.text.get(self.open[-1], "") + data
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,10 @@
 """The page of a robot in headless Chromium: sliders, keys, pointer, narrow windows; positions against the emitted modules."""
 
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import WEAK_CONTRAST, Browser, BrowserError, find_browser
+from browser import WEAK_CONTRAST
 
 from runtime.model import load_model
 from symgen.description import load_robot
@@ -16,18 +15,6 @@ GENERATED = Path(__file__).resolve().parents[2] / "generated"
 ROBOTS = ("tx40", "haptic", "scara", "four_bar")
 POSES = """[...document.querySelectorAll('#poses tr')].map(r => [1, 2, 3].map(k => Number(r.cells[k].dataset.value)))"""
 SET = "(() => {{ const s = document.getElementById('q{}'); s.value = {}; s.dispatchEvent(new Event('input')); return Number(s.value); }})()"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    try:
-        started = Browser(find_browser())
-    except BrowserError as e:
-        if os.environ.get("SYMGEN_REQUIRE_BROWSER") == "1":
-            pytest.fail(f"SYMGEN_REQUIRE_BROWSER=1 but {e}")
-        pytest.skip(f"{e}; install chromium to run the tests in a browser")
-    with started as b:
-        yield b
 
 
 @pytest.fixture(scope="module")
