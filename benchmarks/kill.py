@@ -1,6 +1,6 @@
 """SIGKILL at random moments of the commands that write: is every file old or new, is the set of one run, does a rerun end as if nothing had been?
 
-    python benchmarks/kill.py [VERB...] [--kills 50] [--seed 1]        generate identify cestac report
+    python benchmarks/kill.py [VERB...] [--kills 50] [--seed 1]        generate convert identify cestac report simulate excite
 
 Each command runs over a folder that holds the results of an earlier one (other robot constants, another record) and a file of the user. Half of the kills come
 uniformly over the time of an undisturbed run, half within the time its writing takes, from the moment the folder of unfinished files appears. After each:
@@ -33,7 +33,6 @@ import numpy as np
 
 from runtime import load_model
 from symgen import load_robot
-from symgen.cli.main import VERBS
 from symgen.cli.writing import FINISHED, LOCK, UNFINISHED
 from symgen.emit import generate_module
 
@@ -41,6 +40,16 @@ MAIN = "from symgen.cli.main import main; main()"
 OFTEN = "from runtime.checkpoint import Checkpoint; Checkpoint.__init__.__kwdefaults__['every'] = 0.02; " + MAIN
 ROBOT = "planar_2r"
 NOTE = "of the user"
+LOOP = """symgen: 1
+signals: {lowpass: {cutoff: 100, on: [q]}}
+controller:
+  law: {kind: cascade, kp: KP, kv: 243.45, gain: 35.15}
+  rate: 1000
+  torque: {noise: 0.5}
+  reference:
+    limits: ignore
+    motion: {parts: [{family: fourier, period: 3.0, harmonics: 3, p: [[0.0, 0.06, -0.05, -0.01, 0.02, 0.01, -0.01333333]]}]}
+"""
 
 
 def write_record(path: Path, seed: int, duration: float = 4.0, rate: float = 500.0) -> None:
@@ -62,13 +71,13 @@ def write_record(path: Path, seed: int, duration: float = 4.0, rate: float = 500
 
 
 class Job:
-    """One command, in a version `old` and a version `new` that write the same files."""
+    """One command, in a version `old` and a version `new` that write the same files; OUT stands for the folder they write into."""
 
     def __init__(self, folder: Path, verb: str, old: Sequence[str], new: Sequence[str], code: str = MAIN) -> None:
         self.folder, self.verb, self.arguments, self.code = folder, verb, {"old": old, "new": new}, code
 
     def start(self, which: str, out: Path) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-c", self.code, self.verb, *self.arguments[which], "-o", out.name]
+        command = [sys.executable, "-c", self.code, self.verb, *(a.replace("OUT", out.name) for a in self.arguments[which])]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
         return subprocess.Popen(command, cwd=self.folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 
@@ -88,14 +97,23 @@ def jobs(folder: Path) -> dict[str, Job]:
     for which, gravity in (("old", "9.81"), ("new", "9.80665")):
         (folder / which).mkdir()
         (folder / which / "arm.yaml").write_text(text.replace("9.81", gravity), encoding="utf-8")
-    pairs = {which: [ROBOT, f"{which}.csv"] for which in ("old", "new")}
-    robots = {which: [f"{which}/arm.yaml", "emps", "--target", "numpy,casadi,c,xp"] for which in ("old", "new")}
+        (folder / which / "loop.yaml").write_text(LOOP.replace("KP", "140" if which == "old" else "160.18"), encoding="utf-8")
+    out = ["-o", "OUT"]
+    pairs = {which: [ROBOT, f"{which}.csv", *out] for which in ("old", "new")}
+    robots = {which: [f"{which}/arm.yaml", "emps", "--target", "numpy,casadi,c,xp", *out] for which in pairs}
     study = {which: [*pairs[which], "--delta", "2*pi/5000", "--delta", "2*pi/1000", "--runs", "150"] for which in pairs}
-    found = {"generate": Job(folder, "generate", **robots), "identify": Job(folder, "identify", **pairs)}
-    found["cestac"] = Job(folder, "cestac", **study, code=OFTEN)
-    if "report" in VERBS:
-        found["report"] = Job(folder, "report", **pairs)
-    return found
+    loops = {which: ["emps", f"{which}/loop.yaml", *out] for which in pairs}
+    search = {which: [ROBOT, "--starts", "1", "--seed", seed, *out] for which, seed in (("old", "1"), ("new", "2"))}
+    other = {which: [f"{which}/arm.yaml", "OUT/other.yaml", "--force"] for which in pairs}
+    return {
+        "generate": Job(folder, "generate", **robots),
+        "convert": Job(folder, "convert", **other),
+        "identify": Job(folder, "identify", **pairs),
+        "cestac": Job(folder, "cestac", **study, code=OFTEN),
+        "report": Job(folder, "report", **pairs),
+        "simulate": Job(folder, "simulate", **loops),
+        "excite": Job(folder, "excite", **search),
+    }
 
 
 def digests(folder: Path) -> dict[str, str]:
