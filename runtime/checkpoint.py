@@ -121,7 +121,7 @@ def _write_whole(path: Path, data: bytes) -> None:
 def _json(path: Path) -> Mapping[str, Any]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as e:
+    except (OSError, ValueError, RecursionError) as e:
         raise InputError(f"cannot be read ({e}); delete {path.parent} to start again", file=str(path)) from e
     if not isinstance(found, dict):
         raise InputError(f"not the settings of a study; delete {path.parent} to start again", file=str(path))

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from runtime.errors import InputError
+from runtime.io.files import require_file
 
 LARGEST = 200_000_000  # bytes of a JSON result; that of 1000 parameters has 30 million
 KINDS = ("estimate", "cestac")
@@ -26,7 +27,7 @@ def schema_text(kind: str) -> str:
 def read_document(path: Path, schema: str) -> Mapping[str, Any]:
     """`document` of a file."""
     try:
-        if path.stat().st_size > LARGEST:
+        if require_file(path) > LARGEST:
             raise InputError(f"more than {LARGEST} bytes; expected a result of symgen", file=str(path))
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as e:

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from runtime import json_values as read
 from runtime.documents import document, read_document
 from runtime.errors import InputError
 from runtime.latex import parameter_table
@@ -106,7 +107,7 @@ class Estimate:
     @property
     def relative_sigma(self) -> Array:
         """%sigma of eq. (11), shape (b,), in %; inf for a parameter estimated as exactly zero."""
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return np.asarray(100 * self.sigma / np.abs(self.X))
 
     @property
@@ -261,40 +262,33 @@ def _estimate(data: Mapping[str, Any], file: str) -> Estimate:
 
 def _field(name: str, value: Any) -> Any:
     if name in MISSING:
-        return MISSING[name] if value is None else float(value)
+        return read.number(value, MISSING[name])
     match name:
-        case "X" | "sigma" | "sigma_corrected" | "covariance":
-            array = np.array(value, dtype=float)
-            return array.reshape(0, 0) if name == "covariance" and not array.size else array
+        case "X" | "sigma" | "sigma_corrected":
+            return read.numbers(value)
+        case "covariance":
+            return read.numbers(value) if value else np.empty((0, 0))
         case "names":
-            return tuple(map(_text, value))
+            return read.texts(value)
         case "method" | "status" | "message":
-            return _text(value)
+            return read.text(value)
         case "rank" | "iterations":
-            return int(value)
+            return read.whole(value)
         case "groups":
-            return tuple(tuple(map(_text, group)) for group in value)
+            return tuple(map(read.texts, read.items(value)))
         case "per_joint":
-            return tuple(_joint_fit(fit) for fit in value)
+            return tuple(map(_joint_fit, read.items(value)))
+        case "units":
+            return {key: read.text(unit) for key, unit in read.mapping(value).items()}
         case _:
-            return _mapping(value)
+            return read.mapping(value)
 
 
-def _joint_fit(data: Mapping[str, Any]) -> JointFit:
-    known: dict[str, Any] = {key: math.nan if value is None else value for key, value in data.items()}
-    return JointFit(**known)
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"found {value!r:.60}; expected a text")
-    return value
-
-
-def _mapping(value: Any) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ValueError(f"found {value!r:.60}; expected a mapping")
-    return value
+def _joint_fit(value: Any) -> JointFit:
+    given: dict[str, Any] = {}
+    for key, item in read.mapping(value).items():
+        given[key] = read.text(item) if key == "joint" else read.whole(item) if key == "rows" else read.number(item)
+    return JointFit(**given)
 
 
 def _number(value: float, form: str) -> str:

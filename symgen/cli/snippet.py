@@ -56,12 +56,17 @@ def snippet(
 def with_estimate(robot: Robot, file: Path) -> Robot:
     """The robot with the standard parameters of a feasible estimate as its values; exit code 2 where the file has none or is of another robot."""
     from runtime.estimate import load_estimate
+    from runtime.json_values import number
 
     standard = load_estimate(file).details.get("standard")
-    if not isinstance(standard, dict) or not all(isinstance(x, float | int) for x in standard.values()):
+    if not isinstance(standard, dict):
         fail(
             f"{file}: holds base parameters alone; a program needs standard ones: set estimate: {{method: feasible}} in the study and identify again"
         )
+    try:
+        values = {name: number(x) for name, x in standard.items()}
+    except ValueError as e:
+        fail(f"{file}: details.standard: {e}; the file was changed")
     if unknown := sorted(set(standard) - set(robot.parameters)):
         fail(f"{file}: {', '.join(unknown[:12])} are no parameters of {robot.name}; is it the estimate of another robot?")
-    return replace(robot, values={**robot.values, **{name: float(x) for name, x in standard.items()}})
+    return replace(robot, values={**robot.values, **values})

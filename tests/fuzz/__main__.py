@@ -25,12 +25,13 @@ def main() -> None:
     for name in arguments.formats:
         reader = Reader()  # of its own: threads of one library must not count against the memory of the next
         cases, begun = arguments.cases * FORMATS[name].share // total, monotonic()
-        found: dict[str, int] = {"ok": 0, "refused": 0, "fault": 0}
+        found: dict[str, float] = {"ok": 0, "refused": 0, "fault": 0, "seconds": 0.0, "peak_MB": 0.0}
         known: set[tuple[str, str]] = set()
         slowest = (0.0, 0)
         for number, content, outcome in run(reader, name, arguments.seed, range(arguments.first, arguments.first + cases)):
             found["fault" if outcome.fault else outcome.kind] += 1
             slowest = max(slowest, (outcome.seconds, number))
+            found["peak_MB"] = max(found["peak_MB"], round(outcome.peak / 1e6))
             if outcome.fault and (outcome.kind, outcome.where) not in known:
                 known.add((outcome.kind, outcome.where))
                 content = smaller(reader, name, content, outcome, 12 if outcome.kind in ("hang", "death") else 300)
@@ -45,9 +46,10 @@ def main() -> None:
                     f"  {name} {number}: {outcome.kind} {outcome.where} -> {label}\n     {outcome.text.strip().splitlines()[-1][:200] if outcome.text.strip() else ''}",
                     flush=True,
                 )
+        found["seconds"] = round(slowest[0], 2)
         counts[name] = found
         print(f"{name}: {cases} cases, {found['ok']} ok, {found['refused']} refused, {found['fault']} faults of {len(known)} kinds; "
-              f"slowest {slowest[0]:.2f} s (number {slowest[1]}); {monotonic() - begun:.0f} s", flush=True)  # fmt: skip
+              f"slowest {slowest[0]:.2f} s (number {slowest[1]}), {found['peak_MB']} MB; {monotonic() - begun:.0f} s", flush=True)  # fmt: skip
         reader.close()
     arguments.out.mkdir(parents=True, exist_ok=True)
     (arguments.out / f"counts-{arguments.seed}.json").write_text(report(counts))

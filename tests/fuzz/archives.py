@@ -114,6 +114,15 @@ def npz(members: dict[str, bytes], rng: random.Random) -> bytes:
     return bytes(data)
 
 
+def stored(members: dict[str, bytes]) -> bytes:
+    """A sound archive without compression."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, data in members.items():
+            archive.writestr(zipfile.ZipInfo(name), data)
+    return stream.getvalue()
+
+
 def positions(data: bytes | bytearray, mark: bytes) -> list[int]:
     """Where `mark` stands."""
     found, at = [], data.find(mark)

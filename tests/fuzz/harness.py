@@ -15,7 +15,7 @@ import shutil
 import tempfile
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic, process_time
 
@@ -30,12 +30,13 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True)
 class Outcome:
-    """kind : ok, refused or a fault's name.   where : what tells faults apart.   seconds : processor time."""
+    """kind : ok, refused or a fault's name.   where : what tells faults apart.   seconds : processor time.   peak : bytes, the most so far."""
 
     kind: str
     where: str = ""
     text: str = ""
     seconds: float = 0.0
+    peak: int = 0
 
     @property
     def fault(self) -> bool:
@@ -70,8 +71,8 @@ def place(e: BaseException) -> str:
     return f"{Path(frames[-1].filename).name}:{frames[-1].name}" if frames else "outside"
 
 
-def serve(pipe) -> None:
-    """The other process: a format and a case come in, an outcome goes out."""
+def serve(pipe, folder: Path) -> None:
+    """The other process: a format and a case come in, an outcome goes out; cases are files in `folder`."""
     os.environ.update(OPENBLAS_NUM_THREADS="1", POLARS_MAX_THREADS="1")
     from fuzz.formats import FAULTY, FORMATS
 
@@ -80,6 +81,8 @@ def serve(pipe) -> None:
         "numpy",
         "scipy.io",
         "polars",
+        "h5py",
+        "mujoco",
         "symgen.emit",
         "runtime.io.streams",
         "runtime.estimate",
@@ -88,19 +91,23 @@ def serve(pipe) -> None:
     ):
         __import__(module)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    with tempfile.TemporaryDirectory(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:
-        limited = False
-        while True:
-            name, content = pipe.recv()
-            if not limited:  # after the first case, whose libraries map much that they never touch
-                path = written(Path(folder), known[name].ending, b"")
-                judged(known[name].read, path)
-                status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines() if ":" in line)
-                mapped, resident = (1024 * int(status[key].split()[0]) for key in ("VmData", "VmRSS"))
-                resource.setrlimit(resource.RLIMIT_DATA, (mapped - resident + MEMORY,) * 2)
-                limited = True
-            path = written(Path(folder), known[name].ending, content)
-            pipe.send(judged(known[name].read, path, known[name].named))
+    limited = False
+    while True:
+        name, content = pipe.recv()
+        if not limited:  # after the first case, whose libraries map much that they never touch
+            path = written(folder, known[name].ending, b"")
+            judged(known[name].read, path)
+            resource.setrlimit(resource.RLIMIT_DATA, (memory("VmData") - memory("VmRSS") + MEMORY,) * 2)
+            limited = True
+        path = written(folder, known[name].ending, content)
+        outcome = judged(known[name].read, path, known[name].named)
+        pipe.send(replace(outcome, peak=memory("VmHWM")))
+
+
+def memory(key: str) -> int:
+    """Bytes of this process that the system calls so."""
+    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines() if ":" in line)
+    return 1024 * int(status[key].split()[0])
 
 
 def written(folder: Path, ending: str, content: bytes) -> Path:
@@ -117,7 +124,7 @@ class Reader:
 
     def __init__(self, seconds: float = SECONDS) -> None:
         self.seconds = seconds
-        self.process, self.pipe, self.served = None, None, 0
+        self.process, self.pipe, self.folder, self.served = None, None, None, 0
 
     def __call__(self, name: str, content: bytes) -> Outcome:
         if self.process is None or self.served >= LIFE:
@@ -144,7 +151,8 @@ class Reader:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, other = context.Pipe()
-        self.process = context.Process(target=serve, args=(other,), daemon=True)
+        self.folder = tempfile.TemporaryDirectory(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None)
+        self.process = context.Process(target=serve, args=(other, Path(self.folder.name)), daemon=True)
         self.process.start()
         other.close()
         self.served = 0
@@ -162,6 +170,7 @@ class Reader:
             self.process.kill()
             self.process.join()
             self.pipe.close()
+            self.folder.cleanup()
         self.process = None
 
 
@@ -196,6 +205,6 @@ def smaller(reader: Reader, name: str, content: bytes, like: Outcome, tries: int
     return content
 
 
-def report(counts: dict[str, dict[str, int]]) -> str:
+def report(counts: dict[str, dict[str, float]]) -> str:
     """Counts as JSON text."""
     return json.dumps(counts, indent=2) + "\n"

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from fuzz.archives import npy_header, plain_npy
-from fuzz.formats import csv_file, model_files, npz_members, robot_file, urdf_files
 from fuzz.harness import Reader
+from fuzz.seeds import csv_file, model_files, npz_members, robot_file, urdf_files
 from runtime.errors import InputError
 from runtime.io.files import read_bytes
 from runtime.io.records import read_record

@@ -1,10 +1,10 @@
-"""Cases of text formats, aware of their structure: YAML with nasty values, expressions of the grammar, `.par`, XML, tables."""
+"""Cases of text formats, aware of their structure: YAML with nasty values, expressions of the grammar, `.par`, tables, JSON."""
 
 from __future__ import annotations
 
+import json
 import random
 from typing import Any
-from xml.etree import ElementTree
 
 from ruamel.yaml import YAML
 
@@ -169,109 +169,6 @@ def par(content: bytes, rng: random.Random) -> bytes:
     return text.encode(rng.choice(("utf-8", "utf-8", "utf-8-sig", "latin-1", "utf-16")), "replace")
 
 
-LAUGHS = "".join(f'<!ENTITY a{k} "{10 * f"&a{k - 1};"}">' for k in range(1, 10))
-DOCTYPES = (
-    f'<!DOCTYPE robot [<!ENTITY a0 "aaaaaaaaaa">{LAUGHS}]>',
-    '<!DOCTYPE robot SYSTEM "file:///etc/passwd">',
-    '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///dev/zero">]>',
-    '<!DOCTYPE robot [<!ENTITY % p SYSTEM "http://localhost/x.dtd"> %p;]>',
-    '<!DOCTYPE robot [<!ATTLIST link name CDATA "x">]>',
-    "<?xml-stylesheet href='x'?>",
-    "<![CDATA[x]]>",
-    "<!-- -- -->",
-    "&lt;&#0;&#x110000;&x;",
-)  # fmt: skip
-NUMBERS = (
-    "0",
-    "-0",
-    "1e9",
-    "1e10",
-    "1e308",
-    "1e999",
-    "nan",
-    "inf",
-    "-inf",
-    "1e-300",
-    "0x1p3",
-    "1_0",
-    "",
-    "1 2",
-    "1 2 3 4",
-    "1 0 0",
-    "0 0 0",
-    "1e-7 0 1",
-    "3.14159 1.5708 0",
-    "1e9 1e9 1e9",
-    "1e-320 0 0",
-    "٣",
-    "9" * 400,
-    "abc",
-    "1,5",
-    "-1",
-)
-
-
-def xml(content: bytes, rng: random.Random) -> bytes:
-    """A URDF with attributes and elements changed; sometimes a document type, another encoding, much nesting."""
-    root = ElementTree.fromstring(content)
-    for _ in range(rng.choice((1, 1, 2, 3, 6))):
-        elements = list(root.iter())
-        e, other = rng.choice(elements), rng.choice(elements)
-        match rng.randrange(8):
-            case 0 | 1 | 2 if e.attrib:
-                key = rng.choice(sorted(e.attrib))
-                names = [str(value) for x in elements for value in (x.get("name"), x.get("link"), x.get("joint")) if value]
-                e.set(
-                    key,
-                    rng.choice(
-                        (
-                            rng.choice(NUMBERS),
-                            rng.choice(names),
-                            rng.choice(
-                                (
-                                    "",
-                                    "class",
-                                    "../x",
-                                    "a" * 3000,
-                                    "é",
-                                    "package://../x.dae",
-                                    "revolute",
-                                    "continuous",
-                                    "fixed",
-                                    "floating",
-                                    "prismatic",
-                                )
-                            ),
-                        )
-                    ),
-                )
-            case 3 if e.attrib:
-                del e.attrib[rng.choice(sorted(e.attrib))]
-            case 4 if not any(x is e for x in other.iter()) and len(elements) < 500:
-                e.append(other)
-            case 5 if len(e):
-                e.remove(rng.choice(list(e)))
-            case 6:
-                e.tag = rng.choice(("robot", "link", "joint", "inertial", "mimic", "xacro:macro", "origin", "x", "axis"))
-            case 7:
-                mimic = ElementTree.SubElement(e, "mimic")
-                mimic.attrib = {
-                    "joint": rng.choice(["j1", "j2", *(x.get("name", "") for x in elements if x.tag == "joint")]),
-                    "multiplier": rng.choice(NUMBERS),
-                    "offset": rng.choice(NUMBERS),
-                }
-    text = ElementTree.tostring(root, encoding="unicode")
-    if rng.random() < 0.1:
-        text = rng.choice(DOCTYPES) + text
-    if rng.random() < 0.05:
-        depth, at = rng.choice((10, 40, 20000)), text.index(">") + 1
-        text = text[:at] + "<a>" * depth + "</a>" * rng.choice((depth, 0)) + text[at:]
-    encoding = rng.choice(("utf-8",) * 12 + ("utf-16", "latin-1", "utf-7"))
-    name = rng.choice(("utf-8", "utf-16", "latin-1", "x-none", "ascii", "utf-7", "shift_jis", "idna", "rot13", "zlib"))
-    declared = f'<?xml version="1.0" encoding="{name}"?>' if rng.random() < 0.15 else ""
-    return (declared + text).encode(encoding, "replace")
-
-
 FIELDS = (
     "",
     "nan",
@@ -361,6 +258,42 @@ def table(content: bytes, rng: random.Random) -> bytes:
         else ending.join(map(",".join, rows))
     )
     return text.encode(rng.choice(("utf-8",) * 8 + ("utf-16", "utf-8-sig", "latin-1")), "replace")
+
+
+JSON_VALUES = (
+    *("null", "true", "false", "0", "-1", "1e999", "-1e999", "NaN", "Infinity", "1e308", "9" * 400, "9" * 5000, "1.5", "[]", "{}", "[[]]", "[1, 2]", '{"": 1}', '""', '"x"'),
+    *('"\\u001b[2J"', '"\\ud800"', '"\\u0000"', '"</script>"', '"' + "x" * 5000 + '"', '"symgen-estimate/2"', '"symgen-cestac/1"', "'x'", "01", "1_0", "[[1], [2, 3]]", "[null, 1]"),
+    *("[" * 500, "[" * 5000 + "]" * 5000, "[" * 100_000 + "]" * 100_000, '{"a":' * 5000 + "1" + "}" * 5000, "[" + "1," * 50_000 + "1]"),
+)  # fmt: skip
+
+
+def json_case(data: Any, rng: random.Random) -> bytes:
+    """JSON with values changed, left out or put in from elsewhere; `Raw` text stands as it is."""
+    raw: list[str] = []
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        path = rng.choice(places(data))
+        found = data
+        for key in path[:-1]:
+            found = found[key]
+        if path and isinstance(found, dict) and rng.random() < 0.25:
+            data = changed(
+                data,
+                path[:-1],
+                {
+                    k if k != path[-1] else rng.choice((None, "x" * 3000, "\x1b[2J")): v
+                    for k, v in found.items()
+                    if k != path[-1] or rng.random() < 0.7
+                },
+            )
+        elif path and rng.random() < 0.3:
+            data = changed(data, path, found)
+        else:
+            data = changed(data, path, f"@{len(raw)}@")
+            raw.append(rng.choice(JSON_VALUES))
+    text = json.dumps(data)
+    for k, value in enumerate(raw):
+        text = text.replace(f'"@{k}@"', value)
+    return text.encode("utf-8", "surrogatepass")
 
 
 def is_number(text: str) -> bool:
