@@ -40,6 +40,7 @@ MAIN = "from symgen.cli.main import main; main()"
 OFTEN = "from runtime.checkpoint import Checkpoint; Checkpoint.__init__.__kwdefaults__['every'] = 0.02; " + MAIN
 ROBOT = "planar_2r"
 NOTE = "of the user"
+POLL = 1e-4  # s, between looks at a folder
 LOOP = """symgen: 1
 signals: {lowpass: {cutoff: 100, on: [q]}}
 controller:
@@ -167,7 +168,7 @@ def survived(job: Job, kills: int, chance: random.Random) -> Counter[str]:
         process = job.start("new", out)
         if k % 2:
             while process.poll() is None and not (out / UNFINISHED).exists():
-                pass
+                time.sleep(POLL)
             time.sleep(chance.uniform(0, writing))
         else:
             time.sleep(chance.uniform(0, duration))
@@ -190,10 +191,10 @@ def write_time(job: Job, base: Path) -> float:
     shutil.copytree(base, out)
     process = job.start("new", out)
     while process.poll() is None and not (out / UNFINISHED).exists():
-        pass
+        time.sleep(POLL)
     begin = time.monotonic()
     while process.poll() is None and ((out / UNFINISHED).exists() or (out / FINISHED).exists()):
-        pass
+        time.sleep(POLL)
     found = time.monotonic() - begin
     process.communicate()
     return found
