@@ -40,8 +40,9 @@ ONLY_IN = {  # library: files and folders that may import it
     "threadpoolctl": ("runtime/studies/distributed.py",),
     "scipy": ("runtime/",),
 }
-LAZY = {  # pooch and its requests are loaded only for a dataset, numpy only for a URDF, the text of pages only in a notebook
+LAZY = {  # pooch and its requests are loaded only for a dataset, YAML only for a folder, numpy only for a URDF, the text of pages only in a notebook
     "runtime.io.records": {"runtime.io.datasets"},
+    "runtime.io.bag_contents": {"runtime.io.yaml_text"},
     "symgen.description.files": {"symgen.description.urdf", "symgen.description.mjcf"},
     "symgen.regroup": {"symgen.regroup.regrouping"},
     "symgen.regroup.regrouping": {"symgen.report.notebook"},

@@ -46,7 +46,7 @@ def advised(
         )
     if results is not None:
         title = f"{model.NAME}: encoder resolution advised on {', '.join(r.name for r in records)}"
-        results.write_all(advice_files(advice, study_text(study, folder, results.folder), title))
+        results.write_all(study_files(advice, study_text(study, folder, results.folder), title))
     typer.echo(advice.to_json() if json else f"{advice.to_table()}\n\n{advice.verdict}", nl=not json)
     if results is not None:
         typer.echo(f"report: {results.folder / 'report.html'}", err=True)
@@ -54,20 +54,12 @@ def advised(
     return doubted or any(advice.worst(k)[1] > BIASED for k in range(len(asked)))
 
 
-def advice_files(advice: Advice, study: str, title: str) -> dict[str, str | bytes]:
+def study_files(advice: Advice, study: str, title: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
     from runtime.report.advice import advice_section
     from runtime.report.html import Page, render
     from symgen.cli.pages import settings_section
+    from symgen.cli.resolution_files import advice_files
 
     page = Page(title=title, verdict=advice.verdict, sections=[advice_section(advice), settings_section(study)])
-    return {"report.html": render(page), "study.yaml": study, **advice_figures(advice)}
-
-
-def advice_figures(advice: Advice) -> dict[str, str | bytes]:
-    """advice.json and the figure, by file name."""
-    from runtime.report import plots
-    from runtime.report.advice import advice_figure
-
-    figure = advice_figure(advice)
-    return {"advice.json": advice.to_json(), "advice.png": plots.png(figure), "advice.svg": plots.svg(figure)}
+    return {"report.html": render(page), "study.yaml": study, **advice_files(advice)}

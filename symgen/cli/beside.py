@@ -92,13 +92,12 @@ class Beside:
         from runtime.report import plots
         from runtime.report.friction import friction_figure
         from runtime.report.physical import standard_csv
-        from symgen.cli.advice import advice_figures
-        from symgen.cli.cestac import resolution_figures
+        from symgen.cli.resolution_files import advice_files, cestac_files
 
         found: dict[str, str | bytes] = {"standard_parameters.csv": standard_csv(self.fit)} if self.feasible else {}
         found |= {"friction.png": plots.png(friction_figure(self.friction, self.unit))} if self.friction else {}
-        found |= {} if self.advice is None else advice_figures(self.advice)
-        return {**found, **({} if self.resolution is None else resolution_figures(self.resolution))}
+        found |= {} if self.advice is None else advice_files(self.advice)
+        return {**found, **({} if self.resolution is None else cestac_files(self.resolution))}
 
 
 def beside(

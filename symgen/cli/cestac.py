@@ -93,7 +93,7 @@ def cestac(
             )
         if results is not None:
             title = f"{model.NAME}: encoder resolution on {', '.join(r.name for r in records)}"
-            results.write_all(resolution_files(result, study_text(study, folder, results.folder), title))
+            results.write_all(study_files(result, study_text(study, folder, results.folder), title))
         if checkpoint is not None and result.lists_runs:
             checkpoint.remove()
         typer.echo(result.to_json() if json else console_text(result), nl=not json)
@@ -145,28 +145,16 @@ def verdict_sentence(result: Cestac) -> str:
     return f"Least squares is {'; '.join(parts)}; largest change: {'the residual' if name == 'rho' else name}, {error:.1f} % at {worst.level.label}."
 
 
-def resolution_files(result: Cestac, study: str, title: str) -> dict[str, str | bytes]:
+def study_files(result: Cestac, study: str, title: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
     from runtime.report.html import Page, render
     from runtime.report.sections import level_numbers, resolution_section
     from symgen.cli.pages import settings_section
+    from symgen.cli.resolution_files import cestac_files
 
     sections = [resolution_section(result), settings_section(study)]
     page = Page(title=title, verdict=verdict_sentence(result), sections=sections, numbers=level_numbers(result))
-    return {"report.html": render(page), "study.yaml": study, **resolution_figures(result)}
-
-
-def resolution_figures(result: Cestac) -> dict[str, str | bytes]:
-    """The study in every format, and the figure where a position is perturbed, by file name."""
-    from runtime.exports import array_files, cestac_arrays, cestac_csv
-    from runtime.report import plots
-
-    files: dict[str, str | bytes] = {"cestac.json": result.to_json(), "cestac.csv": cestac_csv(result), "cestac.tex": result.to_latex()}
-    files |= array_files("cestac", cestac_arrays(result))
-    if any(level.level.delta and not level.level.torque for level in result.levels):
-        figure = plots.error_against_resolution(result)
-        files |= {"resolution.png": plots.png(figure), "resolution.svg": plots.svg(figure)}
-    return files
+    return {"report.html": render(page), "study.yaml": study, **cestac_files(result)}
 
 
 def _one_name(columns: str | None) -> str | list[str] | None:

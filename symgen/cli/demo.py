@@ -112,11 +112,11 @@ def verdict(shown: Demonstration) -> str:
 
 def demo_files(shown: Demonstration, study: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
-    from runtime.report import plots
     from runtime.report.html import render
     from symgen.cli.demo_sections import demo_sections
     from symgen.cli.identify import identification_files
     from symgen.cli.pages import identification_page
+    from symgen.cli.resolution_files import cestac_files
 
     kind = "SIMULATED record, nothing measured" if shown.simulated else "public measured record"
     page = identification_page(
@@ -127,11 +127,8 @@ def demo_files(shown: Demonstration, study: str) -> dict[str, str | bytes]:
         warning="The measured record was not available." if shown.simulated else "",
         shown=demo_sections(shown),
     )
-    curve = plots.error_against_resolution(shown.curve or shown.resolution, ("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5"))
     return {
         **identification_files(shown.found, study),
         "report.html": render(page),
-        "cestac.json": shown.resolution.to_json(),
-        "resolution.png": plots.png(curve),
-        "resolution.svg": plots.svg(curve),
+        **cestac_files(shown.resolution, curve=shown.curve, names=("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5")),
     }

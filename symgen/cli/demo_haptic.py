@@ -151,6 +151,7 @@ def demo_files(shown: HapticDemonstration, study: str) -> dict[str, str | bytes]
     from symgen.cli.haptic_sections import FACES, LABELS, MAIN, haptic_sections
     from symgen.cli.identify import identification_files
     from symgen.cli.pages import identification_page
+    from symgen.cli.resolution_files import cestac_files
 
     page = identification_page(
         shown.found,
@@ -160,13 +161,11 @@ def demo_files(shown: HapticDemonstration, study: str) -> dict[str, str | bytes]
         warning="No record of this interface is public.",
         shown=haptic_sections(shown),
     )
-    curve, maps = plots.error_against_resolution(shown.resolution, MAIN), workspace_figure(shown.felt, SHEET, FACES, LABELS)
+    maps = workspace_figure(shown.felt, SHEET, FACES, LABELS)
     return {
         **identification_files(shown.found, study),
         "report.html": render(page),
-        "cestac.json": shown.resolution.to_json(),
-        "resolution.png": plots.png(curve),
-        "resolution.svg": plots.svg(curve),
+        **cestac_files(shown.resolution, names=MAIN),
         "handle.png": plots.png(maps),
         "handle.svg": plots.svg(maps),
     }
