@@ -237,7 +237,7 @@ def coupling_fits(model: GeneratedModel, study: Study, records: Sequence[Record 
     read = [settings.coupling for settings in study.record]
     if len(records) != len(study.record):  # a record that was split at gaps, or records from elsewhere
         read = [*set(read)] * len(records)
-    if model.DRIVES is None or any(settings.side != "motor" for settings in study.record) or len(read) != len(records):
+    if model.DRIVES is None or any(settings.sides != ("motor", "motor") for settings in study.record) or len(read) != len(records):
         return {}
     drives = Drives.from_mapping(model.DRIVES)
     if not (drives.ratio - np.diag(np.diag(drives.ratio))).any():

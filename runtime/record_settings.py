@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from runtime.errors import InputError, SettingsError
-from runtime.io.units import position_unit, time_unit, torque_unit
+from runtime.io.units import COMMANDS, position_unit, time_unit, torque_unit
 
 SHORTEST = 10  # samples of a record, or of a block of one: fewer cannot be filtered nor differentiated twice
 
@@ -25,6 +25,12 @@ class Columns:
     q: tuple[str, ...] = ()
     tau: tuple[str, ...] = ()
     qr: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for key in ("q", "tau", "qr"):
+            names = getattr(self, key)
+            double = next((name for name in names if names.count(name) > 1), None)
+            _require(double is None, (key,), f"{double!r} twice; expected one column per joint")
 
 
 @dataclass(frozen=True)
@@ -84,9 +90,11 @@ class RecordSettings:
     files : one file with everything, or two: positions (and time), then torques. Relative to the study file, or files of `dataset`.
     also : files of further records with the same settings, each a record of its own: [b.csv, c.csv], or pairs of files.
     side : "motor" (qm = R (q - offset), tau = R' u, by the drives of the robot) or "joint".
+    torque_side : the same of tau alone, where it differs: "motor" for joint angles beside motor currents. Default: side.
     rate : sampling rate, Hz; may be left out where there is a time column.
-    counts_per_revolution : where the unit of q is counts.
+    counts_per_revolution : where the unit of q is counts; of one turn of the encoder, on the side of q.
     torque_constant : N*m/A or N*m/V where the unit of tau is one of current or voltage (A, mA, V); default: that of the robot's drives.
+        On the side of tau: of the motor, or with the gear in it where tau is of the joint.
     coupling : use the off-diagonal part of R for "both", for "position" or "torque" alone, or for "none".
     jitter : largest deviation of the time column from a uniform grid, in sampling periods.
     topic : of a bag, where it holds several of sensor_msgs/JointState.
@@ -96,6 +104,7 @@ class RecordSettings:
     files: tuple[str, ...] = ()
     columns: Columns = field(default_factory=Columns)
     side: Literal["motor", "joint"] = "joint"
+    torque_side: Literal["motor", "joint"] | None = None
     rate: float | None = None
     units: Units = field(default_factory=Units)
     scale: Scale = field(default_factory=Scale)
@@ -119,12 +128,24 @@ class RecordSettings:
         _require(len(self.files) <= 2, ("files",), f"{len(self.files)} files; expected one, or two (positions, then torques)")
         _require(self.rate is None or self.rate > 0, ("rate",), f"{self.rate} Hz; expected a positive rate")
         _require(0 < self.jitter < 0.5, ("jitter",), f"{self.jitter}; expected a fraction of a sampling period between 0 and 0.5")
-        units = self.units.q if isinstance(self.units.q, tuple) else (self.units.q,)
+        counts = any(position_unit(unit)[0] == "counts" for unit in _each(self.units.q))
+        _require(self.counts_per_revolution is not None or not counts, ("counts_per_revolution",), "missing; positions in counts need it")
         _require(
-            self.counts_per_revolution is not None or all(position_unit(unit)[0] != "counts" for unit in units),
+            self.counts_per_revolution is None or counts,
             ("counts_per_revolution",),
-            "missing; positions in counts need it",
+            f"given, but units.q is {', '.join(_each(self.units.q))}; say counts there, or leave this out",
         )
+        commands = any(torque_unit(unit)[0] in COMMANDS for unit in _each(self.units.tau))
+        _require(
+            self.torque_constant is None or commands,
+            ("torque_constant",),
+            f"given, but units.tau is {', '.join(_each(self.units.tau))}; say mA, A or V there, or leave this out",
+        )
+
+    @property
+    def sides(self) -> tuple[str, str]:
+        """Of the positions and of the torques."""
+        return self.side, self.torque_side or self.side
 
 
 def each_record(settings: tuple[RecordSettings, ...]) -> tuple[RecordSettings, ...]:
@@ -134,6 +155,10 @@ def each_record(settings: tuple[RecordSettings, ...]) -> tuple[RecordSettings, .
         for record in settings
         for single in (replace(record, also=()), *(replace(record, files=files, also=(), name=None) for files in record.also))
     )
+
+
+def _each(units: str | tuple[str, ...]) -> tuple[str, ...]:
+    return units if isinstance(units, tuple) else (units,)
 
 
 def _require(ok: bool, path: tuple[str | int, ...], message: str) -> None:

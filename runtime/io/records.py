@@ -15,7 +15,7 @@ import numpy as np
 
 from runtime.drives import Drives
 from runtime.errors import InputError
-from runtime.io.conversion import column_names, conversion, finite_columns, reference_columns
+from runtime.io.conversion import column_names, conversion, finite_columns, reference_columns, require_alike
 from runtime.io.table import Table, read_table
 from runtime.io.timing import clock
 from runtime.io.units import time_unit
@@ -33,7 +33,7 @@ IRREGULAR = 0.05  # between the rate of the settings and the median step of stam
 def read_record(settings: RecordSettings, drives: Drives | None = None, *, folder: Path | None = None) -> Record:
     """The record that the settings describe, joint side, SI; InputError where `resample` splits it into several.
 
-    drives : of the robot; needed where side is "motor".   folder : where relative file names start (default: the current folder).
+    drives : of the robot; needed where a side is "motor".   folder : where relative file names start (default: the current folder).
     """
     parts = read_parts(settings, drives, folder=folder)
     if len(parts) > 1:
@@ -48,10 +48,7 @@ def read_parts(settings: RecordSettings, drives: Drives | None = None, *, folder
     first, last = tables[0][0], tables[-1][0]
     names = column_names(settings, first, last)
     q, tau = finite_columns(first, names.q), finite_columns(last, names.tau)
-    if q.shape != tau.shape:
-        raise InputError(
-            f"positions {q.shape} in {first.file}, torques {tau.shape} in {last.file}; expected as many samples and joints in both"
-        )
+    require_alike(names, first, last, q.shape, tau.shape)
     n = q.shape[1]
     if drives is not None and drives.n != n:
         raise InputError(f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file)

@@ -18,7 +18,7 @@ import numpy as np
 
 from runtime.drives import Drives
 from runtime.errors import InputError
-from runtime.io.conversion import Conversion, column_names, conversion, finite_columns
+from runtime.io.conversion import Conversion, column_names, conversion, finite_columns, require_alike
 from runtime.io.files import sha256_of
 from runtime.io.records import file_hashes, read_records, record_files
 from runtime.io.table import BLOCK_READERS, BlockTable, open_table
@@ -105,11 +105,7 @@ def open_stream(settings: RecordSettings, drives: Drives | None = None, *, folde
             raise InputError(f"{count} samples; a record has at least {SHORTEST}", file=table.file)
     beginning, torques = next(first.blocks(names.q, SHORTEST)), next(last.blocks(names.tau, SHORTEST))
     q, tau = beginning.stack(names.q), torques.stack(names.tau)
-    if q.shape != tau.shape or others != samples:
-        raise InputError(
-            f"positions {(samples, q.shape[1])} in {first.file}, torques {(others, tau.shape[1])} in {last.file}; "
-            "expected as many samples and joints in both"
-        )
+    require_alike(names, first, last, (samples, q.shape[1]), (others, tau.shape[1]))
     n = q.shape[1]
     if drives is not None and drives.n != n:
         raise InputError(f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file)

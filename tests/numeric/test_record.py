@@ -8,7 +8,7 @@ import pytest
 import scipy.io
 
 from runtime import Drives, Record, read_record, read_records
-from runtime.errors import InputError
+from runtime.errors import InputError, SettingsError
 from runtime.study import RecordSettings, study_from_mapping
 
 N, RATE = 60, 200.0
@@ -171,6 +171,54 @@ def test_torque_constants(tmp_path):
         tau(side="joint", units={"tau": "A"})
 
 
+def test_joint_angles_beside_motor_currents(tmp_path):
+    """The side of the torques may be another than that of the positions: both mixtures give what a record of one side gives."""
+    drives = Drives(np.array([[10.0, 0], [5, -20]]), [0.1, -0.3], [0.1, 0.2])
+    motor = drives.motor_position(Q)
+    write_csv(tmp_path / "joint.csv")
+    write_csv(tmp_path / "motor.csv", rows=np.column_stack([T, motor, TAU]))
+
+    def read(name, **record):
+        return read_record(settings(files=name, **record), drives, folder=tmp_path)
+
+    one = read("motor.csv", side="motor", units={"tau": "mA"})
+    mixed = read("joint.csv", side="joint", torque_side="motor", units={"tau": "mA"})
+    np.testing.assert_allclose(mixed.q, one.q, atol=1e-12)
+    np.testing.assert_array_equal(mixed.tau, one.tau)
+    np.testing.assert_allclose(mixed.tau, (TAU * 1e-3 * [0.1, 0.2]) @ drives.ratio)
+    other = read("motor.csv", side="motor", torque_side="joint")
+    np.testing.assert_array_equal(other.q, one.q)
+    np.testing.assert_array_equal(other.tau, TAU)
+    with pytest.raises(InputError, match=r"set record\.torque_side: motor"):
+        read("joint.csv", units={"tau": "mA"})
+
+
+@pytest.mark.parametrize(
+    ("record", "said"),
+    [
+        ({"torque_constant": 0.1}, r"record\.torque_constant: given, but units\.tau is N\*m; say mA"),
+        ({"counts_per_revolution": 4096, "units": {"q": "deg"}}, r"record\.counts_per_revolution: given, but units\.q is deg; say counts"),
+        ({"columns": {"q": ["a", "a"]}}, r"record\.columns\.q: 'a' twice; expected one column per joint"),
+    ],
+)
+def test_settings_that_contradict_each_other(record, said):
+    with pytest.raises(SettingsError, match=said):
+        settings(**record)
+
+
+def test_two_files_are_the_two_halves_of_one_record(tmp_path):
+    for name in ("a.csv", "b.csv"):
+        write_csv(tmp_path / name)
+    write_csv(tmp_path / "tau.csv", header="tau1,tau2", rows=TAU[:-3])
+    for said, record in (
+        (r"hold positions and torques each; .*also: \[b\.csv\]", {"files": ["a.csv", "b.csv"]}),
+        (r"60 samples of positions in a\.csv, 57 of torques in tau\.csv; cut", {"files": ["a.csv", "tau.csv"]}),
+        (r"1 columns of positions \(q1\), 2 of torques \(tau1, tau2\)", {"files": "a.csv", "columns": {"q": "q1"}}),
+    ):
+        with pytest.raises(InputError, match=said):
+            read_record(settings(**record), folder=tmp_path)
+
+
 def test_motor_side_needs_drives(tmp_path):
     write_csv(tmp_path / "a.csv")
     drives = Drives(np.diag([2.0, -4.0]), [0.1, 0.2], 1.0)
@@ -226,7 +274,7 @@ def test_bad_csv(tmp_path, rows, said):
     ("record", "said"),
     [
         ({"columns": {"q": ["q1", "q3"]}}, "no column q3; the file has t, q1, q2, tau1, tau2"),
-        ({"columns": {"q": ["q1"]}}, "positions (60, 1) in a.csv, torques (60, 2)"),
+        ({"columns": {"q": ["q1"]}}, "1 columns of positions (q1), 2 of torques (tau1, tau2)"),
         ({"columns": {"t": "time"}}, "no column time"),
         ({"rate": 100, "columns": {"t": "t"}}, "time runs at 200 Hz, record.rate is 100 Hz"),
         ({"scale": {"tau": "gtau"}}, "no single number 'gtau' in a text file"),
@@ -259,7 +307,7 @@ def test_wrong_number_of_joints(tmp_path):
 def test_different_lengths(tmp_path):
     write_csv(tmp_path / "q.csv", header="q1,q2", rows=Q)
     write_csv(tmp_path / "tau.csv", header="tau1,tau2", rows=TAU[:-1])
-    with pytest.raises(InputError, match=r"positions \(60, 2\) in q.csv, torques \(59, 2\) in tau.csv"):
+    with pytest.raises(InputError, match="60 samples of positions in q.csv, 59 of torques in tau.csv"):
         read_record(settings(files=["q.csv", "tau.csv"], rate=RATE), folder=tmp_path)
     np.savez(tmp_path / "a.npz", q1=Q[:, 0], q2=Q[1:, 1], tau1=T, tau2=T)
     with pytest.raises(InputError, match="different lengths: q1 60, q2 59"):
