@@ -98,6 +98,7 @@ class RecordSettings:
     coupling : use the off-diagonal part of R for "both", for "position" or "torque" alone, or for "none".
     jitter : largest deviation of the time column from a uniform grid, in sampling periods.
     topic : of a bag, where it holds several of sensor_msgs/JointState.
+    decimal : how a text file writes decimals, "." or "," (columns then separated by semicolons, tabs or blanks).
     resample : how a time column that is not uniform is made so; null: it is refused.
     """
 
@@ -115,6 +116,7 @@ class RecordSettings:
     dataset: str | None = None
     name: str | None = None
     topic: str | None = None
+    decimal: Literal[".", ","] = "."
     resample: Resample | None = None
     also: tuple[tuple[str, ...], ...] = ()
 

@@ -44,7 +44,7 @@ def read_record(settings: RecordSettings, drives: Drives | None = None, *, folde
 def read_parts(settings: RecordSettings, drives: Drives | None = None, *, folder: Path | None = None) -> list[Record]:
     """The record, or the records into which `resample` splits it at gaps and where time goes back."""
     paths = record_files(settings, folder)
-    tables = [read_table(path, settings.topic) for path in paths]
+    tables = [read_table(path, settings.topic, settings.decimal) for path in paths]
     first, last = tables[0][0], tables[-1][0]
     names = column_names(settings, first, last)
     q, tau = finite_columns(first, names.q), finite_columns(last, names.tau)

@@ -95,7 +95,7 @@ def open_stream(settings: RecordSettings, drives: Drives | None = None, *, folde
     if settings.resample is not None:
         raise InputError("record.resample needs the whole record; set stream: off", file=settings.name or settings.files[0])
     paths = record_files(settings, folder)
-    tables = tuple(open_table(path) for path in paths)
+    tables = tuple(open_table(path, settings.decimal) for path in paths)
     first, last = tables[0], tables[-1]
     names = column_names(settings, first, last)
     samples = first.samples([*([] if names.t is None else [names.t]), *names.q])

@@ -76,8 +76,8 @@ BLOCK_READERS: Mapping[str, Callable[[Path, str], BlockTable]] = {
 }
 
 
-def open_table(path: Path) -> BlockTable:
-    """A file to be read by blocks; InputError for formats that are read whole only."""
+def open_table(path: Path, decimal: str = ".") -> BlockTable:
+    """A file to be read by blocks; InputError for formats that are read whole only.   decimal : of the numbers of a text file."""
     kind = _kind(path)
     if kind not in BLOCK_READERS:
         what = "bags" if kind in BAGS else f"{kind} files"
@@ -88,19 +88,19 @@ def open_table(path: Path) -> BlockTable:
         raise InputError(f"a {kind} file within .gz cannot be read by blocks; uncompress it, or set stream: off", file=str(path))
     if not path.is_file():
         raise InputError("cannot be read: no such file", file=str(path))
-    return BLOCK_READERS[kind](path, path.name)
+    return text_blocks(path, path.name, decimal) if BLOCK_READERS[kind] is text_blocks else BLOCK_READERS[kind](path, path.name)
 
 
-def read_table(path: Path, topic: str | None = None) -> tuple[Table, str]:
+def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> tuple[Table, str]:
     """Table of a measured file, and the SHA-256 of its uncompressed bytes.
 
     path : .csv, .txt, .dat, .tsv, .npy, .npz, .parquet or .mat, perhaps ending in .gz; .bag, .mcap, .db3 or the folder of a ROS 2 bag.
-    topic : of a bag; default: the only one that holds sensor_msgs/JointState.
+    topic : of a bag; default: the only one that holds sensor_msgs/JointState.   decimal : "." or ",", of the numbers of a text file.
     """
     kind = _kind(path)
     if kind not in BAGS:
         data = read_bytes(path)
-        return READERS[kind](data, path.name), sha256(data)
+        return read_text(data, path.name, decimal) if READERS[kind] is read_text else READERS[kind](data, path.name), sha256(data)
     if path.suffix.lower() == ".gz":
         raise InputError("a bag within .gz; uncompress it", file=str(path))
     if not path.exists():

@@ -1,4 +1,5 @@
-"""Columns of a text file: comma, semicolon, tab or blanks between numbers, one header line or none, `#` before comments."""
+"""Columns of a text file: comma, semicolon, tab or blanks between numbers, one header line or none, `#` before comments; decimals with a point, or with a
+comma where that is said."""
 
 from __future__ import annotations
 
@@ -18,6 +19,7 @@ from runtime.io.naming import WIDEST, check_names
 Array = np.ndarray
 
 LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits each
+UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
 MOST = 10_000_000  # lines held at once, some 80 bytes each beside their text
 
 
@@ -53,9 +55,14 @@ class TextTable:
             for i in indices:
                 if not _is_number(fields[i]):
                     what = "an empty field" if not fields[i] else repr(fields[i])
-                    hint = "; write decimals with a point" if "," in fields[i] else ""
+                    hint = self._hint(k, fields[i])
                     return InputError(f"{what}; expected a number{hint}", file=self.file, column=self.names[i], row=f"line {k}")
         return InputError("a field that is not a number", file=self.file)
+
+    def _hint(self, number: int, field: str) -> str:
+        if "," in field:
+            return "; write decimals with a point, or set record.decimal: ','"
+        return "; put # before a second line of names or units" if number == self.line_numbers[0] and field else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +74,7 @@ class TextBlocks:
     names: tuple[str, ...]
     delimiter: str | None
     has_header: bool
+    decimal: str
 
     def samples(self, names: Sequence[str]) -> int:
         """Length of the columns."""
@@ -79,19 +87,19 @@ class TextBlocks:
         lines = self._lines()
         while block := list(islice(lines, size)):
             numbers, found = zip(*block, strict=True)
-            yield _table(found, numbers, self.names, self.delimiter, self.file)
+            yield _table(found, numbers, self.names, self.delimiter, self.decimal, self.file)
 
     def _lines(self) -> Iterator[tuple[int, str]]:
         return islice(_numbered_lines(self.path), 1 if self.has_header else 0, None)
 
 
-def text_blocks(path: Path, file: str) -> TextBlocks:
+def text_blocks(path: Path, file: str, decimal: str = ".") -> TextBlocks:
     """A text file to be read by blocks; its first line tells the columns, as in `read_text`."""
     first = next(_numbered_lines(path), None)
     if first is None:
         raise InputError("no line of numbers", file=file)
-    names, has_header, delimiter = _header(first[1], file)
-    return TextBlocks(path, file, names, delimiter, has_header)
+    names, has_header, delimiter = _header(first[1], decimal, file)
+    return TextBlocks(path, file, names, delimiter, has_header, decimal)
 
 
 def _numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
@@ -104,15 +112,15 @@ def _numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
                 if line and not line.startswith("#"):
                     yield k, line
     except UnicodeDecodeError as e:
-        raise InputError(f"not a text file in UTF-8 (byte {e.start} of a block)", file=path.name) from None
+        raise InputError(f"not a text file in UTF-8 (byte {e.start} of a block); {UTF8}", file=path.name) from None
 
 
-def read_text(data: bytes, file: str) -> TextTable:
-    """Table of the bytes of a text file; without a header line columns are called 1, 2, 3 ..."""
+def read_text(data: bytes, file: str, decimal: str = ".") -> TextTable:
+    """Table of the bytes of a text file; without a header line columns are called 1, 2, 3 ...   decimal : "." or ",", within numbers."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as e:
-        raise InputError(f"not a text file in UTF-8 (byte {e.start})", file=file) from None
+        raise InputError(f"not a text file in UTF-8 (byte {e.start}); {UTF8}", file=file) from None
     if max(text.count("\n"), text.count("\r")) > MOST:
         raise InputError(f"more than {MOST} lines; read them by blocks (stream: 65536 in the study file, or --block)", file=file)
     rows = (
@@ -127,21 +135,21 @@ def read_text(data: bytes, file: str) -> TextTable:
         numbers, lines = [k for k, _ in kept], [line for _, line in kept]
     if not lines:
         raise InputError("no line of numbers", file=file)
-    names, has_header, delimiter = _header(lines[0], file)
+    names, has_header, delimiter = _header(lines[0], decimal, file)
     if has_header:
         numbers, lines = numbers[1:], lines[1:]
     if not lines:
         raise InputError(f"no line of numbers under the header {', '.join(names)}", file=file)
-    return _table(lines, numbers, names, delimiter, file)
+    return _table(lines, numbers, names, delimiter, decimal, file)
 
 
-def _header(line: str, file: str) -> tuple[tuple[str, ...], bool, str | None]:
+def _header(line: str, decimal: str, file: str) -> tuple[tuple[str, ...], bool, str | None]:
     """Names of the columns by the first line, whether it is a header, and the delimiter."""
-    delimiter = _delimiter(line)
+    delimiter = _delimiter(line, decimal)
     header = _fields(line, delimiter)
     if len(header) > WIDEST:
         raise InputError(f"{len(header)} columns; at most {WIDEST} are read, write those you need into a file of their own", file=file)
-    if all(_is_number(x) for x in header):
+    if all(_is_number(x.replace(decimal, ".")) for x in header):
         return tuple(str(i + 1) for i in range(len(header))), False, delimiter
     double = sorted(name for name, count in Counter(header).items() if count > 1)
     if double:
@@ -149,13 +157,18 @@ def _header(line: str, file: str) -> tuple[tuple[str, ...], bool, str | None]:
     return tuple(header), True, delimiter
 
 
-def _table(lines: Sequence[str], numbers: Sequence[int], names: tuple[str, ...], delimiter: str | None, file: str) -> TextTable:
-    """The table, if every line has one field per name."""
+def _table(
+    lines: Sequence[str], numbers: Sequence[int], names: tuple[str, ...], delimiter: str | None, decimal: str, file: str
+) -> TextTable:
+    """The table, if every line has one field per name; its numbers with a point."""
     widths = [len(line.split()) for line in lines] if delimiter is None else [line.count(delimiter) + 1 for line in lines]
     if widths.count(len(names)) < len(widths):
         k, width = next((k, width) for k, width in zip(numbers, widths, strict=True) if width != len(names))
-        raise InputError(f"{width} fields; expected {len(names)} ({', '.join(names)})", file=file, row=f"line {k}")
-    return TextTable(file, names, tuple(lines), numbers, delimiter)
+        hint = "put # before lines that are neither names nor numbers"
+        if delimiter == "," and width > len(names):
+            hint = "if decimals are written with commas, separate columns by semicolons and set record.decimal: ','"
+        raise InputError(f"{width} fields; expected {len(names)} ({', '.join(names)}); {hint}", file=file, row=f"line {k}")
+    return TextTable(file, names, tuple(lines if decimal == "." else [line.replace(decimal, ".") for line in lines]), numbers, delimiter)
 
 
 def _require_short(length: int, file: str, number: int) -> None:
@@ -163,8 +176,8 @@ def _require_short(length: int, file: str, number: int) -> None:
         raise InputError(f"a line of more than {LONGEST} characters; expected one sample a line", file=file, row=f"line {number}")
 
 
-def _delimiter(line: str) -> str | None:
-    return next((d for d in (";", "\t", ",") if d in line), None)
+def _delimiter(line: str, decimal: str) -> str | None:
+    return next((d for d in (";", "\t", ",") if d in line and d != decimal), None)
 
 
 def _fields(line: str, delimiter: str | None) -> list[str]:

@@ -9,6 +9,7 @@ import scipy.io
 
 from runtime import Drives, Record, read_record, read_records
 from runtime.errors import InputError, SettingsError
+from runtime.io.streams import open_stream
 from runtime.study import RecordSettings, study_from_mapping
 
 N, RATE = 60, 200.0
@@ -217,6 +218,54 @@ def test_two_files_are_the_two_halves_of_one_record(tmp_path):
     ):
         with pytest.raises(InputError, match=said):
             read_record(settings(**record), folder=tmp_path)
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t", " "])
+@pytest.mark.parametrize("header", [True, False])
+def test_decimal_commas(tmp_path, delimiter, header):
+    """Decimal commas where `record.decimal` says so, in memory and by blocks; the names in a header keep theirs."""
+    rows = [[format(x, ".17g").replace(".", ",") for x in row] for row in np.column_stack([1000 * T, Q, TAU])]
+    top = "t,ms;q,1;q,2;tau,1;tau,2".replace(";", delimiter) if header else ""
+    write_csv(tmp_path / "a.csv", header=top, rows=rows, delimiter=delimiter)
+    columns = {"t": "t,ms", "q": ["q,1", "q,2"], "tau": ["tau,1", "tau,2"]} if header else {"t": "1", "q": ["2", "3"], "tau": ["4", "5"]}
+    given = settings(files="a.csv", columns=columns, units={"t": "ms"}, decimal=",")
+    whole, stream = read_record(given, folder=tmp_path), open_stream(given, folder=tmp_path, block=25)
+    np.testing.assert_array_equal(whole.q, Q)
+    np.testing.assert_array_equal(whole.tau, TAU)
+    np.testing.assert_array_equal(np.concatenate([q for _, q, _ in stream.blocks()]), Q)
+
+
+NAMES = "t;q1;q2;tau1;tau2\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (NAMES + "0;0,1;0,2;1;2\n", "line 2: '0,1'; expected a number; write decimals with a point, or set record.decimal: ','"),
+        (
+            NAMES.replace(";", ",") + "0,0,1,0,2,1,2\n",
+            "line 2: 7 fields; expected 5 (t, q1, q2, tau1, tau2); if decimals are written with commas, separate columns by semicolons "
+            "and set record.decimal: ','",
+        ),
+        (NAMES + "ms;deg;deg;mA;mA\n0;0;0;0;0\n", "line 2: 'deg'; expected a number; put # before a second line of names or units"),
+        (
+            "Log of cell\n" + NAMES + "0;0;0;0;0\n",
+            "line 2: 1 fields; expected 3 (Log, of, cell); put # before lines that are neither names nor numbers",
+        ),
+    ],
+)
+def test_logs_as_offices_write_them(tmp_path, text, said):
+    """Every message names the line and what to change."""
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(InputError) as e:
+        read_record(settings(files="log.csv"), folder=tmp_path)
+    assert said in str(e.value)
+
+
+def test_a_log_of_another_encoding_says_how_to_save_it(tmp_path):
+    (tmp_path / "log.csv").write_text("Winkel [°];q1\n", encoding="latin-1")
+    with pytest.raises(InputError, match=r"not a text file in UTF-8 .*; save it so \(Excel: CSV UTF-8"):
+        read_record(settings(files="log.csv"), folder=tmp_path)
 
 
 def test_motor_side_needs_drives(tmp_path):
