@@ -53,15 +53,20 @@ def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False) -> tuple[R
 
 
 def _compiled(mjcf: Mjcf) -> Any:
+    """The model; MuJoCo's remarks on its own simulation of it would go to the screen and to a file of the working folder."""
     try:
         import mujoco
     except ImportError as error:
         raise DescriptionError("MJCF is read by MuJoCo: pip install symgen[mjcf]") from error
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
     try:
         return mujoco.MjModel.from_xml_string(mjcf.text)
     except ValueError as error:
         said = " ".join(str(error).split())
         raise DescriptionError(f"MuJoCo refuses the file: {said.removeprefix('XML Error: ').removeprefix('Error: ')[:300]}") from error
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 @dataclass

@@ -166,3 +166,12 @@ def test_mangled_files_raise_nothing_else(data):
         read_mjcf(text.encode("utf-8", "surrogatepass"), "arm.xml")
     except DescriptionError as error:
         assert re.search(r"\(arm\.xml, line \d+\)$", str(error))
+
+
+def test_nothing_is_said_or_written_beside_the_result(tmp_path, monkeypatch, capfd) -> None:
+    """Two hinges on one axis: MuJoCo cannot solve for their accelerations and would tell a file of the working folder."""
+    hinge = '<joint type="hinge" axis="0 0 1"/>'
+    text = f'<mujoco><worldbody><body>{hinge * 2}<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>'
+    monkeypatch.chdir(tmp_path)
+    assert read_mjcf(text.encode(), "a.xml")[0].joints == (1, 2)
+    assert list(tmp_path.iterdir()) == [] and capfd.readouterr() == ("", "")
