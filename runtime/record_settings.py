@@ -64,15 +64,17 @@ class Scale:
 
 @dataclass(frozen=True)
 class Resample:
-    """Time stamps that are not uniform, brought to a uniform rate by interpolation; nothing is resampled unless this is there.
+    """Time stamps that are not uniform, made so; nothing is resampled unless this is there.
 
-    rate : Hz; default: record.rate, else the mean rate of the record.   method : "cubic", a spline through the samples, or "linear".
+    rate : Hz; default: record.rate, else the mean rate of the record.
+    method : "cubic" or "linear": interpolated, the stamps being the instants of the samples; "count": the samples as they are, for a logger whose stamps
+        jitter while the controller samples uniformly.
     gaps : "refuse" a record with gaps or with time that goes back, or "split" it there into records of their own.
     longest : steps up to so many sampling periods are bridged, longer ones are gaps.   shortest : s; pieces shorter than that are left out.
     """
 
     rate: float | None = None
-    method: Literal["cubic", "linear"] = "cubic"
+    method: Literal["cubic", "linear", "count"] = "cubic"
     gaps: Literal["refuse", "split"] = "refuse"
     longest: float = 3.0
     shortest: float = 0.5

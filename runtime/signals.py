@@ -80,7 +80,8 @@ def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
     """Second-order sections of the low-pass, shape (sections, 6), and the samples by which its ends are extended."""
     if low.cutoff >= rate / 2:
         raise InputError(
-            f"low-pass at {low.cutoff:g} Hz for a record at {rate:g} Hz; expected less than the Nyquist frequency {rate / 2:g} Hz, set signals.lowpass.cutoff"
+            f"low-pass at {low.cutoff:g} Hz for a record at {rate:g} Hz; expected less than the Nyquist frequency {rate / 2:g} Hz, "
+            "set signals.lowpass.cutoff (or record.units.t, where the rate is not that of the record)"
         )
     sos = butter(low.order, low.cutoff, fs=rate, output="sos")
     length = low.order + 1

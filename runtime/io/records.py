@@ -23,7 +23,7 @@ from runtime.model import GeneratedModel
 from runtime.record import Record
 from runtime.record_settings import RecordSettings, each_record
 from runtime.resampling import Stretch, resampled
-from runtime.time_stamps import time_stamps
+from runtime.time_stamps import TimeStamps, time_stamps
 
 Array = np.ndarray
 
@@ -124,6 +124,11 @@ def _clock(settings: RecordSettings, table: Table, name: str, t: Array) -> float
     except InputError as e:
         if not (np.diff(t) > 0).any():
             raise
-        said = time_stamps(t, file=table.file).to_text(table.row)
-        message = f"{e.message}. In all: {said}. record.resample: {{gaps: split}} cuts and resamples"
-        raise InputError(message, file=e.file, column=e.column, row=e.row) from None
+        stamps = time_stamps(t, file=table.file)
+        cure = "" if stamps.regular and stamps.jitter <= settings.jitter else f". record.resample: {_cure(stamps)}"
+        raise InputError(f"{e.message}. In all: {stamps.to_text(table.row)}{cure}", file=e.file, column=e.column, row=e.row) from None
+
+
+def _cure(stamps: TimeStamps) -> str:
+    cut, cuts = ("{gaps: split}", "cuts there and ") if stamps.gaps or stamps.resets else ("{}", "")
+    return f"{cut} {cuts}interpolates at the stamps, with method: count it takes the samples as uniform"

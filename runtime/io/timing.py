@@ -69,7 +69,7 @@ def _require_uniform(settings: RecordSettings, tables: Iterable[Table], name: st
         file, row, step_here = place
         raise InputError(
             f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step {step_here:g} s here, {1 / rate:g} s on average; "
-            "raise record.jitter if the clock alone is at fault",
+            "where the clock alone is at fault, state record.rate without columns.t, or raise record.jitter (below 0.5)",
             file=file,
             column=name,
             row=row,

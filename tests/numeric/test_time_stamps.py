@@ -119,6 +119,26 @@ def test_a_repeated_stamp_keeps_its_first_sample():
     assert text.endswith("1 samples of repeated stamps left out")
 
 
+def test_counted_samples_stay_as_they_are():
+    """Uniform samples whose stamps jitter, repeat, miss 0.5 s and start anew: three stretches of the very samples, on a uniform grid."""
+    t = T + np.random.default_rng(3).uniform(-0.25, 0.25, len(T)) / RATE + 0.5 * (np.arange(len(T)) >= 800)
+    t[1500:] -= t[1500]
+    t[101] = t[100]
+    stretches, rate, text = resampled(t, [signal(T)], time_stamps(t), Resample(method="count", gaps="split"), RATE, file="x")
+    np.testing.assert_array_equal(np.concatenate([s.signals[0] for s in stretches]), signal(T))
+    assert [len(s.t) for s in stretches] == [800, 700, 500] and rate == RATE
+    assert all(np.array_equal(s.t, s.t[0] + np.arange(len(s.t)) / RATE) for s in stretches)
+    assert text == "taken as uniform at 500 Hz (count): 2000 samples in 3 stretches"
+    _, own, _ = resampled(t, [signal(T)], time_stamps(t), Resample(method="count", gaps="split"), None, file="x")
+    assert own == pytest.approx(RATE, rel=1e-3)
+
+
+def test_counted_samples_must_fill_their_time():
+    for t, rate in ((np.delete(T, range(0, 2000, 100)), RATE), (T, 510.0)):
+        with pytest.raises(InputError, match="the rate is another, or samples are missing; state record"):
+            resampled(t, [signal(t)], time_stamps(t), Resample(method="count"), rate, file="x")
+
+
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
@@ -173,6 +193,7 @@ def test_errors_tell_all_irregularities(tmp_path):
         with pytest.raises(InputError) as e:
             read_record(study(columns={"t": "t"}, **record).record[0], folder=tmp_path)
         assert "a.npz" in str(e.value) and said in str(e.value)
+        assert record or "record.resample: {gaps: split} cuts there and interpolates at the stamps, with method: count" in str(e.value)
         assert "rate" in record or ("1 gap at sample 801" in str(e.value) and "1 repeated stamp at sample 101" in str(e.value))
 
 
