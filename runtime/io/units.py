@@ -67,6 +67,7 @@ EXAMPLES = {
     TIMES: "s, ms, us, ns",
     SPEEDS: "rad/s, deg/s, rpm, rev/s, m/s, mm/s",
 }
+LARGEST = 1e5  # SI; units above are slips of the shift key: MA for mA, Grad (which is 1e9 rad) for deg
 LONGEST = 40  # characters
 FACTOR = r"[^\W\d]{1,24}(?:(?:\*\*|\^)-?[1-4])?"
 GRAMMAR = re.compile(rf"{FACTOR}(?:\s?[*/·]\s?{FACTOR}| {FACTOR}){{0,3}}")
@@ -101,10 +102,14 @@ def speed(value: Any) -> Any:
 
 
 def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
+    if text == "grad":
+        raise InputError("'grad' is a 400th of a turn to some and a degree to others; write units such as gon or deg")
     kind, factor = TABLE[text] if text in TABLE else _of_pint(text)
     if kind not in kinds:
         known = f"is a unit of {kind}" if kind else "is not a unit known here"
         raise InputError(f"{text[:LONGEST]!r} {known}; expected one of {', '.join(kinds)}, such as {EXAMPLES[kinds]}")
+    if factor > LARGEST:
+        raise InputError(f"{text!r} is {factor:g} {SI[kind]}, which nothing here is measured in; expected units such as {EXAMPLES[kinds]}")
     return kind, factor
 
 
