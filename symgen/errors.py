@@ -42,9 +42,9 @@ class DescriptionError(SymgenError):
 
 
 class ExpressionError(SymgenError):
-    """A text that is not an expression of the robot-file grammar; `column` counts from 1."""
+    """A text that is not an expression of the robot-file grammar; `column` counts from 1, `advice` ends the message."""
 
-    def __init__(self, message: str, *, text: str, column: int | None = None) -> None:
+    def __init__(self, message: str, *, text: str, column: int | None = None, advice: str = "") -> None:
         self.text, self.column = text, column
         place = "" if column is None else f" at column {column}"
-        super().__init__(f"{message}{place} in {text[:80]!r}")
+        super().__init__(f"{message}{place} in {text[:80]!r}{advice}")

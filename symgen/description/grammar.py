@@ -16,6 +16,7 @@ import re
 from collections.abc import Iterable
 from fractions import Fraction
 
+from symgen.description.advice import symbol_advice, unit_advice
 from symgen.description.expression import Expression, call
 from symgen.errors import ExpressionError
 
@@ -41,7 +42,9 @@ class _Parser:
             if match is None:
                 at = len(text) - len(text[position:].lstrip())
                 raise self.error(
-                    f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** ( ), sin, cos, tan, sqrt", at + 1
+                    f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** ( ), sin, cos, tan, sqrt",
+                    at + 1,
+                    unit_advice(text[at]),
                 )
             kind = str(match.lastgroup)
             self.tokens.append((kind, match.group(kind), match.start(kind) + 1))
@@ -49,8 +52,8 @@ class _Parser:
         self.tokens.append(("end", "end of text", len(text) + 1))
         self.position = 0
 
-    def error(self, message: str, column: int) -> ExpressionError:
-        return ExpressionError(message, text=self.text, column=column)
+    def error(self, message: str, column: int, advice: str = "") -> ExpressionError:
+        return ExpressionError(message, text=self.text, column=column, advice=advice)
 
     def accept(self, *texts: str) -> str | None:
         kind, text, _ = self.tokens[self.position]
@@ -131,7 +134,7 @@ class _Parser:
         if kind == "name":
             if self.accept("("):
                 if text not in FUNCTIONS:
-                    raise self.error(f"{text!r} is not a function of the grammar; sin, cos, tan and sqrt are", column)
+                    raise self.error(f"{text!r} is not a function of the grammar; sin, cos, tan and sqrt are", column, unit_advice(text))
                 e = self.sum()
                 if self.accept(")") is None:
                     raise self.error("missing )", self.tokens[self.position][2])
@@ -141,7 +144,10 @@ class _Parser:
                     raise self.error(f"{text} of {e}: {error or 'division by zero'}", column) from error
             if text == "pi" or self.symbols is None or text in self.symbols:
                 return Expression.symbol(text)
-            raise self.error(f"undeclared symbol {text!r}; declared here: {', '.join(sorted(self.symbols)) or 'none'}", column)
+            declared = sorted(self.symbols)
+            raise self.error(
+                f"undeclared symbol {text!r}; declared here: {', '.join(declared) or 'none'}", column, symbol_advice(text, declared)
+            )
         raise self.error(f"expected a number, a symbol or (, found {text!r}", column)
 
 
@@ -156,5 +162,5 @@ def parse(text: str | int | float, symbols: Iterable[str] | None = None) -> Expr
     e = parser.sum()
     kind, found, column = parser.tokens[parser.position]
     if kind != "end":
-        raise parser.error(f"unexpected {found!r} after a complete expression", column)
+        raise parser.error(f"unexpected {found!r} after a complete expression", column, unit_advice(found))
     return e

@@ -173,7 +173,10 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
         what = "free joint" if kind == FREE else "ball joint"
         hint = "the base rests here: remove it" if kind == FREE else "write three hinges"
         raise DescriptionError(f"{what} {name!r}: hinge and slide joints are read; {hint}", line=line)
-    dof, axis = int(model.jnt_dofadr[k]), np.array(model.jnt_axis[k]) / np.linalg.norm(model.jnt_axis[k])
+    dof, axis = int(model.jnt_dofadr[k]), np.array(model.jnt_axis[k])
+    if not 0 < np.linalg.norm(axis) < np.inf:
+        raise DescriptionError(f"joint {name!r}: its axis has no direction; expected three numbers of like size", line=line)
+    axis /= np.linalg.norm(axis)
     anchor = _pose(model.jnt_pos[k], np.array([1.0, 0.0, 0.0, 0.0]))
     ref = float(model.qpos0[int(model.jnt_qposadr[k])])
     back = np.eye(4)  # from q = ref to q = 0
@@ -286,4 +289,4 @@ def _length(model: Any, kind: int, k: int) -> _Solved:
         return {k: Fraction(1)}, reference[k]
     first, count = int(model.tendon_adr[k]), int(model.tendon_num[k])
     row = {int(model.wrap_objid[w]): Fraction(repr(float(model.wrap_prm[w]))) for w in range(first, first + count)}
-    return row, sum((c * reference[i] for i, c in row.items()), start=Fraction(0))
+    return {i: c for i, c in row.items() if c}, sum((c * reference[i] for i, c in row.items()), start=Fraction(0))

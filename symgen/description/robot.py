@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
+from symgen.description.advice import degrees_advice
 from symgen.description.expression import ONE, ZERO, Call, Expression
 from symgen.description.forms import determinant, form_of, moves, row_of
 from symgen.errors import DescriptionError
@@ -226,7 +227,12 @@ def _check(robot: Robot) -> None:
 
 def check_identifier(name: str, path: Path) -> None:
     if not IDENTIFIER.match(name) or keyword.iskeyword(name):
-        raise DescriptionError(f"{name!r} is no identifier; use a letter followed by letters, digits or _ (at most 40)", path=path)
+        what = (
+            "is a word of Python; choose another"
+            if keyword.iskeyword(name)
+            else "is no identifier; use a letter followed by letters, digits or _ (at most 40)"
+        )
+        raise DescriptionError(f"{'.'.join(str(key) for key in path)}: {name!r} {what}", path=path)
 
 
 def _check_text(text: str, name: str) -> None:
@@ -329,14 +335,28 @@ def _check_geometry(robot: Robot) -> None:
             e: Expression = getattr(f, name)
             variable = (name, f.sigma) in {("theta", REVOLUTE), ("r", PRISMATIC)}
             if variable and (e.coefficient(f.q) != ONE or moves(e - Expression.symbol(f.q))):
-                raise DescriptionError(f"frame {f.j}: {name} = {e}; expected {f.q} once, as {f.q} or {f.q} + constant", path=where)
+                raise DescriptionError(
+                    f"frame {f.j}: {name} = {e}; expected {f.q} once, as {f.q} or {f.q} + constant{_other_sigma(f)}", path=where
+                )
             if not variable and moves(e):
                 raise DescriptionError(
                     f"frame {f.j}: {name} = {e}; a joint position stands in theta if sigma is 0, in r if sigma is 1, nowhere else",
                     path=where,
                 )
             _declared(robot, e, where, {f.q} if variable else set())
-            _exact(e, where, angle=name in ("gamma", "alpha", "theta"))
+            angle = name in ("gamma", "alpha", "theta")
+            _exact(e, where, angle=angle)
+            if angle and (advice := degrees_advice(f.theta0 if name == "theta" else e, dict(robot.constants))):
+                raise DescriptionError(f"frame {f.j}: {name} = {e}: {advice}", path=where)
+
+
+def _other_sigma(f: Frame) -> str:
+    """What sigma says, where the row reads as one of another joint."""
+    if moves(f.theta) or (f.sigma == PRISMATIC and moves(f.r)):
+        return ""
+    if f.sigma == REVOLUTE:
+        return f"; sigma: 0 is revolute; a prismatic joint has sigma: 1 and r: {f.q}, a fixed frame (a tool) sigma: 2"
+    return f"; sigma: 1 is prismatic; a revolute joint has sigma: 0 and theta: {f.q}, a fixed frame (a tool) sigma: 2"
 
 
 def _check_element(robot: Robot, e: Element) -> None:
@@ -383,7 +403,8 @@ def _check_loops(robot: Robot) -> None:
                 raise DescriptionError(f"loop {k + 1}: {name} frame {getattr(loop, name)} does not exist", path=(*where, name))
         if robot.frame(loop.twin).sigma != FIXED:
             raise DescriptionError(
-                f"loop {k + 1}: twin frame {loop.twin} has sigma {robot.frame(loop.twin).sigma}; expected 2 (fixed on its link)",
+                f"loop {k + 1}: twin frame {loop.twin} has sigma {robot.frame(loop.twin).sigma}; expected 2 (fixed on its link)"
+                f"{'; cut and twin are exchanged' if robot.frame(loop.cut).sigma == FIXED else ''}",
                 path=(*where, "twin"),
             )
         if robot.frame(loop.cut).mu:
@@ -430,7 +451,21 @@ def _check_tables(robot: Robot) -> None:
                 )
     for name in robot.values:
         if name not in robot.parameters:
-            raise DescriptionError(f"values: {name!r} is not a standard parameter of {robot.name}", path=("values", name))
+            raise DescriptionError(
+                f"values: {name!r} is not a standard parameter of {robot.name}{_nearest(robot, name)}", path=("values", name)
+            )
+
+
+def _nearest(robot: Robot, name: str) -> str:
+    """Where a name under `values` was probably meant to lead."""
+    if name.endswith("R") and name[:-1] in robot.parameters:
+        return f"; base parameters (...R) are not given, standard ones are: {name[:-1]}"
+    number = re.search(r"\d+\Z", name)
+    j = int(number.group()) if number else 0
+    if name.removesuffix(str(j)) in INERTIAL and j in robot._by_number:
+        return f"; frame {j} is massless or cut" if j not in robot.links else ""
+    own = [p for p in robot.parameters if p.endswith(str(j))] if j else []
+    return f"; expected names such as {', '.join(own or robot.parameters[:12])}"
 
 
 __all__ = [

@@ -178,7 +178,31 @@ def explain(error: ValidationError) -> tuple[str, Path]:
         return f"{place}: found {given}; expected {limits.get('min_length', limits.get('max_length'))} entries", path
     expected = "a name" if kind == "string_type" and first["loc"][-1] == "[key]" else _EXPECTED.get(kind)
     text = f"expected {expected}" if expected else first["msg"].removeprefix("Value error, ")
-    return f"{place}: found {given}; {text}", path
+    return f"{place}: found {given}; {text}{_advice(path, first['input'])}", path
+
+
+def _advice(path: Path, given: Any) -> str:
+    """What to write instead, where a value of the wrong type shows what was meant."""
+    if path[-1:] == ("sigma",):
+        return ": 0 revolute, 1 prismatic, 2 fixed"
+    if path[:2] == ("drives", "ratio") and len(path) == 3:
+        return "; ratio has one row per motor: [[100, 0], [0, 80]]"
+    if path[:1] == ("constants",) and isinstance(given, int):
+        return "; a decimal comma? write 0.06, not 0,06"
+    if path[:1] == ("constants",) and isinstance(given, str) and len(path) == 2:
+        return (
+            "; a constant is a number of its own: sums of constants stand where they are used" if "undeclared" in _constant(given) else ""
+        )
+    return ""
+
+
+def _constant(text: str) -> str:
+    """Why `text` is no constant expression, else ""."""
+    try:
+        parse(text, ())
+    except ExpressionError as error:
+        return str(error)
+    return ""
 
 
 def _keys(path: Path) -> list[str]:

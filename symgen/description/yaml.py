@@ -26,6 +26,7 @@ from ruamel.yaml.events import (
 )
 
 from symgen.description import robot as model
+from symgen.description.advice import yaml_advice
 from symgen.description.build import build
 from symgen.description.robot import Robot
 from symgen.description.schema import SCHEMA, RobotFile, explain
@@ -83,7 +84,8 @@ def _document(content: bytes, lines: dict[model.Path, int]) -> Any:
         raise
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        raise DescriptionError(f"not YAML: {error.problem or error.context}", line=mark.line + 1 if mark else None) from error
+        problem = str(error.problem or error.context)
+        raise DescriptionError(f"not YAML: {problem}{yaml_advice(problem)}", line=mark.line + 1 if mark else None) from error
     except Exception as error:  # on malformed text the scanner also raises IndexError, AttributeError and others: none of it is YAML
         raise DescriptionError(f"not YAML: {str(error).splitlines()[0] if str(error) else type(error).__name__}") from error
 

@@ -26,7 +26,7 @@ def test_never_overwrites(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("2arm.yaml", "letter"), ("my arm.yaml", "letter"), ("arm.txt", ".yaml"), ("class.yaml", "identifier")]
+    ("name", "words"), [("2arm.yaml", "letter"), ("my arm.yaml", "letter"), ("arm.txt", ".yaml"), ("class.yaml", "word of Python")]
 )
 def test_bad_names(name, words, tmp_path):
     result = run("new", tmp_path / name)

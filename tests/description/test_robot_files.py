@@ -43,7 +43,7 @@ WRONG = [
     ("name: arm\n", "", 1, ["'name' is missing"]),
     ("name: arm", "name: 2arm", 2, ["'2arm'", "letter"]),
     ("name: arm", "name: a b", 2, ["'a b'", "letter"]),
-    ("name: arm", "name: class", 2, ["'class'", "identifier"]),
+    ("name: arm", "name: class", 2, ["name: 'class'", "word of Python"]),
     ("name: arm", "name: [a]", 2, ["['a']", "expected text"]),
     ("title: Test arm", "titel: Test arm", 3, ["'titel'", "did you mean 'title'"]),
     ("title: Test arm", 'title: "a\\nb"', 3, ["expected one line"]),
@@ -116,6 +116,36 @@ WRONG = [
     ("values:", "loops: [{cut: 2, twin: 1, start: {x: 1}}]\nvalues:", 14, ["'x'", "expected q1, q2"]),
     ("values:", "constraints: {q2: q1}\nvalues:", 14, ["q2", "not a passive joint"]),
     ("values:", "constraints: {z2: q1}\nvalues:", 14, ["'z2'", "expected q1, q2"]),
+    # what novices write, and what to write instead
+    ("theta: q2", "theta: q2 + 90", 8, ["frame 2: theta = q2 + 90", "14.3 turns", "90 degrees are pi/2"]),
+    ("2: {ant: 1, sigma: 0, alpha: 0", "2: {ant: 1, sigma: 0, alpha: -90", 8, ["alpha = -90", "angles are in rad"]),
+    ("theta: q2", "theta: q2 + 90*D2", 8, ["45 rad", "angles are in rad"]),
+    ("theta: q2", "theta: q2 + 90deg", 8, ["unexpected 'deg'", "90 degrees are pi/2"]),
+    ("theta: q2", "theta: q2 + 90°", 8, ["unexpected '°'", "90 degrees are pi/2"]),
+    ("theta: q2", "theta: q2 + PI/2", 8, ["'PI'", "did you mean 'pi'"]),
+    ("theta: q2", "theta: q2 + pi^2", 8, ["unexpected '^'", "a power is written **"]),
+    ("d: D2", "d: d2", 8, ["'d2'", "did you mean 'D2'"]),
+    ("D2: 0.5", "D2: 500 mm", 5, ["unexpected 'mm'", "SI and rad"]),
+    ("D2: 0.5", "D2: 0,5", 5, ["decimal comma"]),
+    ("D2: 0.5", "D2: g/20", 5, ["a constant is a number of its own"]),
+    (
+        "theta: q2, r: 0",
+        "theta: 0, r: q2",
+        8,
+        ["expected q2 once", "a prismatic joint has sigma: 1 and r: q2", "a fixed frame (a tool) sigma: 2"],
+    ),
+    ("1, sigma: 0", "1, sigma: 1", 8, ["theta = q2", "in r if sigma is 1"]),
+    ("1, sigma: 0", "1, sigma: prismatic", 8, ["'prismatic'", "0 revolute, 1 prismatic, 2 fixed"]),
+    ("[[100, 0], [0, 100]]", "[100, 100]", 12, ["found 100", "one row per motor"]),
+    ("M1: 2.0", "M1R: 2.0", 14, ["'M1R'", "standard ones are: M1"]),
+    ("M1: 2.0", "mass2: 2.0", 14, ["'mass2'", "expected names such as XX2", "M2", "FV2"]),
+    ("M1: 2.0", "M2: 2.0}\nmassless: [2] #{", 14, ["'M2'", "frame 2 is massless"]),
+    ("values:", "loops:\n  - {cut: 3, twin: 2}\nvalues:", 15, ["cut frame 3 does not exist"]),
+    ("  2: {ant", "\t2: {ant", 8, ["a tab stands here; indent with spaces"]),
+    ("  2: {ant", "   2: {ant", 8, ["indented otherwise"]),
+    ("theta: q2, r: 0}", "theta: q2 r: 0}", 8, ["missing , or }"]),
+    ("title: Test arm", "title: Arm: test", 3, ["between quotes"]),
+    ("  2: {ant", "  - {ant", 8, ["every row as `1: {...}`"]),
     # YAML that says more than it shows
     ("[0, -g, 0]", "&a [0, -g, 0]", 4, ["anchors", "write the value out"]),
     ("[0, -g, 0]", "*a", 4, ["aliases", "write the value out"]),
@@ -138,6 +168,17 @@ def test_error_names_line_given_and_expected(old, new, line, words):
     assert str(error).endswith(f"(arm.yaml, line {error.line})")
     for word in words:
         assert word in str(error), str(error)
+
+
+def test_cut_and_twin_exchanged():
+    fixed = "  3: {ant: 1, sigma: 2, alpha: 0, d: D2, theta: 0, r: 0}\n"
+    error = error_of(ARM.replace("elements:", f"{fixed}loops: [{{cut: 3, twin: 2}}]\nelements:"))
+    assert "twin frame 2 has sigma 0" in str(error) and "cut and twin are exchanged" in str(error)
+
+
+@pytest.mark.parametrize("theta", ["q2 + 3*pi", "q2 - 6.28", "q2 + 8*pi + D2"])
+def test_turns_written_with_pi_are_no_degrees(theta):
+    assert parse_robot(ARM.replace("theta: q2", f"theta: {theta}").encode(), "arm.yaml").joints == (1, 2)
 
 
 @pytest.mark.parametrize(
