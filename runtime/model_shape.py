@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from runtime.errors import ModelError
 
 LONGEST, MOST_WORDS = 20_000_000, 800_000  # characters; words and marks, each up to a kilobyte of syntax tree
+MOST_POWER = 100  # robot files have exponents up to 32
 
 
 def _words(text: str) -> frozenset[str]:
@@ -132,6 +133,12 @@ class _Shape:
     def of_arg(self, node: ast.arg) -> None:
         if node.annotation or node.arg.startswith("__"):
             self.refuse(node, "an argument that emitted models do not have")
+
+    def of_binop(self, node: ast.BinOp) -> None:
+        exponent = node.right.operand if isinstance(node.right, ast.UnaryOp) else node.right
+        written = isinstance(exponent, ast.Constant) and isinstance(exponent.value, int) and exponent.value <= MOST_POWER
+        if isinstance(node.op, ast.Pow) and (not written or isinstance(node.left, ast.Constant)):
+            self.refuse(node, f"a power that emitted models do not take; their exponents are numbers up to {MOST_POWER}")
 
     def of_name(self, node: ast.Name) -> None:
         above = self.parent[id(node)]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,9 +15,26 @@ from typing import Any
 
 from runtime.errors import InputError, first_line
 from runtime.io.arrays import ArrayBlock, ArrayTable
-from runtime.io.limits import require_size
+from runtime.io.files import require_file
+from runtime.io.limits import allowed, require_size
 from runtime.io.naming import check_names
 
+TRIAL = """
+import sys
+from io import BytesIO
+import polars
+path, step, most = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+source = path if path else BytesIO(sys.stdin.buffer.read())
+lazy = polars.scan_parquet(source)
+names = [name for name, kind in lazy.collect_schema().items() if kind.is_numeric() or kind == polars.Boolean]
+rows = lazy.select(polars.len()).collect().item()
+if rows * len(names) <= most:
+    if path:
+        for a in range(0, rows, step):
+            lazy.select(polars.col(names).cast(polars.Float64)).slice(a, step).collect()
+    else:
+        polars.read_parquet(source, columns=names)
+"""  # what is read below, by a process of its own
 READ = 2**18  # rows read at a time: about one row group of the usual writers
 _SILENT = Lock()
 
@@ -23,6 +42,7 @@ _SILENT = Lock()
 def read_parquet(data: bytes, file: str) -> ArrayTable:
     """Table of the numeric columns of the bytes of a Parquet file; missing values become nan."""
     polars = _polars(file)
+    _try(file, len(data), data=data)
     with _refused(polars, file):
         lazy = polars.scan_parquet(BytesIO(data))
         names = _numeric(polars, lazy.collect_schema())
@@ -62,10 +82,13 @@ class ParquetBlocks:
 def parquet_blocks(path: Path, file: str) -> ParquetBlocks:
     """A Parquet file to be read by blocks."""
     polars = _polars(file)
+    size = require_file(path)
+    _try(file, size, path=path)
     with _refused(polars, file):
-        schema = polars.read_parquet_schema(path)
+        names = _numeric(polars, polars.read_parquet_schema(path))
         rows = int(polars.scan_parquet(path).select(polars.len()).collect().item())
-    return ParquetBlocks(path, file, tuple(_numeric(polars, schema)), rows)
+    require_size(8 * rows * len(names), size, file)
+    return ParquetBlocks(path, file, tuple(names), rows)
 
 
 def _polars(file: str) -> Any:
@@ -78,6 +101,17 @@ def _polars(file: str) -> Any:
 
 def _numeric(polars: Any, schema: Any) -> list[str]:
     return [name for name, kind in schema.items() if kind.is_numeric() or kind == polars.Boolean]
+
+
+def _try(file: str, size: int, *, path: Path | str = "", data: bytes = b"") -> None:
+    """Read a file of `size` bytes, or the bytes themselves, in a process of its own; InputError where that ends it.
+
+    Some damage makes polars ask for more memory than there is, and its library then ends the process: no exception, every result lost.
+    """
+    command = [sys.executable, "-P", "-c", TRIAL, str(path), str(READ), str(allowed(size) // 8)]
+    done = subprocess.run(command, input=data, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+    if done.returncode not in (0, 1):  # 1: an exception, which will come here as well
+        raise InputError("damaged: the library that reads Parquet ends on it; write it again", file=file)
 
 
 @contextmanager

@@ -79,17 +79,25 @@ def _constant(text: str) -> tuple[str, float]:
 def _values(file: Path) -> dict[str, float]:
     """name,value rows of a CSV; the header may be there."""
     import csv
+    from math import isfinite
+
+    from runtime.io.files import read_bytes
 
     found: dict[str, float] = {}
-    with file.open(encoding="utf-8", newline="") as stream:
-        for line, row in enumerate(csv.reader(stream), start=1):
-            if row in ([], ["name", "value"]):
-                continue
-            try:
-                name, value = row
-                found[name] = float(value)
-            except ValueError:
-                fail(f"{file}, line {line}: found {','.join(row)[:60]!r}; expected name,value")
+    try:
+        rows = list(csv.reader(read_bytes(file).decode("utf-8-sig").splitlines()))
+    except (UnicodeDecodeError, csv.Error) as e:
+        fail(f"{file}: {e}; expected lines of name,value")
+    for line, row in enumerate(rows, start=1):
+        if row in ([], ["name", "value"]):
+            continue
+        try:
+            name, value = row
+            found[name] = float(value)
+        except ValueError:
+            fail(f"{file}, line {line}: found {','.join(row)[:60]!r}; expected name,value")
+        if not isfinite(found[name]):
+            fail(f"{file}, line {line}: {name[:60]} is {value[:60]}; expected a finite number")
     return found
 
 

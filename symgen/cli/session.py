@@ -48,10 +48,10 @@ def reported_errors() -> Iterator[None]:
     except BrokenPipeError:
         _stop_printing()
     except Exception as e:
-        from runtime.errors import InputError  # not before it is needed: runtime takes most of a second to load
+        from runtime.errors import DataUnavailableError, InputError  # not before it is needed: runtime takes most of a second to load
 
         if isinstance(e, InputError | SymgenError):
-            fail(str(e))
+            fail(str(e), lines=isinstance(e, DataUnavailableError))
         if isinstance(e, OSError):
             fail(f"{e.filename or 'cannot print, or write a temporary file'}: {e.strerror or e}")
         raise
@@ -65,9 +65,12 @@ def _stop_printing() -> NoReturn:
     raise typer.Exit(BROKEN_PIPE)
 
 
-def fail(message: str) -> NoReturn:
-    """End with `message` and exit code 2."""
-    typer.echo(f"error: {message}", err=True)
+def fail(message: str, *, lines: bool = False) -> NoReturn:
+    """End with `message` and exit code 2; on one line unless it is meant to have several: what it names may have any characters."""
+    from symgen.errors import printable
+
+    said = message if lines else message.replace("\n", "\\n")
+    typer.echo(f"error: {printable(said)}", err=True)
     raise typer.Exit(BAD_INPUT)
 
 

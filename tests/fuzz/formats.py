@@ -43,7 +43,7 @@ FORMATS: dict[str, Format] = {
     "npy": Format("npy", archives.npy, reading.read_record, 30),
     "mat": Format("mat", making.make_mat, reading.read_record, 50),
     "mat73": Format("mat", making.make_mat73, reading.read_record, 30),
-    "parquet": Format("parquet", making.make_parquet, reading.read_record, 30),
+    "parquet": Format("parquet", making.make_parquet, reading.read_record, 8),
     "bag": Format("bag", partial(making.make_bag, "bag"), reading.read_record, 20),
     "mcap": Format("mcap", partial(making.make_bag, "mcap"), reading.read_record, 20),
     "db3": Format("db3", partial(making.make_bag, "db3"), reading.read_record, 15),

@@ -241,7 +241,7 @@ def table(content: bytes, rng: random.Random) -> bytes:
             case 3 | 4:
                 rows[0][rng.randrange(len(rows[0]))] = rng.choice(HEADERS)
             case 5:
-                rows[k] = rng.choice(([""], [], rows[k] * 2, rows[k][:-1], rows[k] * 5000, [*rows[k], "#"]))
+                rows[k] = rng.choice(([""], [], rows[k] * 2, rows[k][:-1], rows[k] * (5000 if len(rows[k]) < 100 else 1), [*rows[k], "#"]))
                 rows[k] = rows[k] or [""]
             case 6:
                 rows[k:k] = [list(rows[rng.randrange(len(rows))])] * rng.choice((1, 3, 100))
