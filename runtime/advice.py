@@ -103,6 +103,11 @@ class Advice:
         """m where the robot's parameters are those of prismatic joints, else rad."""
         return "m" if {self.reference.units.get(name, "") for name in self.names} & {"N*s/m", "kg"} else "rad"
 
+    @property
+    def place(self) -> str:
+        """Where the encoders stand."""
+        return {"joint": "at the joints", "motor": "at the motors"}[self.settings.get("cestac", {}).get("side", "joint")]
+
     def worst(self, step: int) -> tuple[str, float]:
         """The parameter that matters most at the step asked for, and its %e."""
         decisive = [self.names.index(name) for name in self.deciding]
@@ -131,7 +136,7 @@ class Advice:
     def _sentence(self, limit: Limit, who: str) -> str:
         if not np.isfinite(limit.delta):
             return f"{who}, no step makes a parameter that matters change by {limit.percent:g} %."
-        text = f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = {step_text(limit.delta, self.unit)} ({limit.parameter} first"
+        text = f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = {step_text(limit.delta, self.unit)} {self.place} ({limit.parameter} first"
         if limit.sampled is not None:
             text += f"; {limit.sampled.runs} runs there gave {limit.error:.2f} +- {limit.half_width:.2f} %"
         return text + ")."

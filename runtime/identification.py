@@ -25,6 +25,7 @@ from runtime.estimators.tls import tls_options
 from runtime.model import GeneratedModel
 from runtime.observation import Observation, observe, stack
 from runtime.perturbation import with_errors
+from runtime.physical import negative_elements
 from runtime.record import Record
 from runtime.record_errors import RecordError, record_errors
 from runtime.record_stream import ChangedStream, Stream
@@ -123,15 +124,24 @@ class Identification:
         worst = max(self.carried.per_joint, key=lambda joint: joint.relative_error)
         named = f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)" if self.observation.n > 1 else ""
         return (
-            f"{len(self.carried.names)} of {len(self.every.names)} parameters carry the model of {self.model.NAME}: they explain the record "
-            f"{self.name} to {self.carried.relative_error:.1f} %{named} and predict an "
-            f"unseen part of it to {self.predicted_error:.1f} %."
+            f"{len(self.carried.names)} of {len(self.every.names)} parameters carry the model of {self.model.NAME}: they leave "
+            f"{self.carried.relative_error:.1f} % of the torques of the record {self.name} unexplained{named}, and {self.predicted_error:.1f} % of a part that "
+            "the fit has not seen."
         )
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to look at before the values are used, in sentences: parameters that trade against each other, by name."""
-        return self.weak.warnings
+        """What to look at before the values are used, in sentences: signs that no drive has, parameters that trade against each other, by name."""
+        signs = (
+            f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: a sign of the joint is wrong (ratio, torque constant or "
+            "column), or its coupling, unit or frame."
+        )
+        return (*([signs] if self.negative else []), *self.weak.warnings)
+
+    @property
+    def negative(self) -> tuple[str, ...]:
+        """Motor inertias and frictions that carry the model and are certainly negative."""
+        return negative_elements(self.model, self.carried)
 
     def summary(self) -> dict[str, Any]:
         """What estimate.json holds beside the Estimate of all parameters."""

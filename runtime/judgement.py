@@ -21,6 +21,7 @@ from runtime.cestac_result import BIASED, NEGLIGIBLE, Level
 from runtime.estimate import Estimate
 from runtime.estimators import CLOSED_LOOP
 from runtime.identification import Identification
+from runtime.physical import CERTAIN
 from runtime.validation import CORRELATION
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def judge(found: Identification, *, feasibility: Feasibility | None = None, advi
     """The judgement of an identification, with what was asked besides."""
     checks = [determined(found)]
     if found.every.status != "rank-deficient":
-        checks += [explained(found), *every_joint(found), predicted(found), certain(found), apart(found.carried)]
+        checks += [explained(found), *every_joint(found), predicted(found), signs(found), certain(found), apart(found.carried)]
         checks += [physical(found.every, feasibility), resolved(advice)]
     return Judgement(tuple(checks), found.verdict)
 
@@ -131,7 +132,7 @@ def explained(found: Identification) -> Check:
     return Check(
         "Does the model explain the torques?",
         graded(error, *TOTAL),
-        f"To {error:.1f} %",
+        f"{error:.1f} % of them stay unexplained",
         f"{TOTAL[0]:g} % (usable to {TOTAL[1]:g} %)",
         remedy,
     )
@@ -143,7 +144,7 @@ def every_joint(found: Identification) -> list[Check]:
     if len(joints) < 2:
         return []
     worst = max(joints, key=lambda joint: joint.relative_error)
-    text = f"Worst is joint {worst.joint} with {worst.relative_error:.1f} %"
+    text = f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained"
     remedy = f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, time shift between position and torque"
     return [Check("On every joint?", graded(worst.relative_error, *JOINT), text, f"{JOINT[0]:g} % (usable to {JOINT[1]:g} %)", remedy)]
 
@@ -158,10 +159,18 @@ def predicted(found: Identification) -> Check:
     return Check(
         "Does it predict data it has not seen?",
         graded(worst, *limits) if np.isfinite(worst) else "open",
-        f"To {worst:.1f} %, against {fit:.1f} % where it was fitted",
+        f"{worst:.1f} % stay unexplained there, {fit:.1f} % where it was fitted",
         f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
         remedy,
     )
+
+
+def signs(found: Identification) -> Check:
+    """Friction and motor inertia below zero: told without any extra, and by far the most frequent slip of a robot file or study."""
+    remedy = "look at the sign of ratio, torque constant and columns of that joint, then at its coupling, units and frame; fit again"
+    text = f"Below zero: {', '.join(found.negative)}" if found.negative else "None is certainly below zero"
+    question = "Have friction and motor inertia the sign they must have?"
+    return Check(question, "no" if found.negative else "good", text, f"above -{CERTAIN:g} deviations", remedy)
 
 
 def certain(found: Identification) -> Check:
@@ -208,7 +217,9 @@ def physical(fit: Estimate, feasibility: Feasibility | None) -> Check:
     if "standard" in fit.details:
         return Check(question, "good", "Yes: they were fitted under these conditions", limit)
     if feasibility is None:
-        return Check(question, "open", "Not asked", limit, "ask with --physical (extra consistency)")
+        return Check(
+            question, "open", "Not asked", limit, "pip install symgen[consistency], then symgen report, or symgen identify --physical"
+        )
     if feasibility.feasible:
         return Check(question, "good", f"Yes, margin {feasibility.margin:.2g}", limit)
     named = ", ".join(name for name, _ in feasibility.blocking)
@@ -224,11 +235,19 @@ def resolved(advice: Advice | None) -> Check:
     steps = ", ".join(
         f"{one.percent:g} % up to {step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}" for one in first
     )
-    text = f"Least squares stays within {steps}"
+    text = f"Least squares stays within {steps} {advice.place}"
     if not advice.asked:
-        return Check(question, "open", text, limit, "compare these steps with that of your encoder (--encoder STEP)")
+        return Check(
+            question,
+            "open",
+            text,
+            limit,
+            "compare these steps with that of your encoder (--encoder STEP, --side motor where it sits there)",
+        )
     name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
-    text += f"; at {', '.join(Level(step).label for step in advice.asked)} the largest change is {error:.2g} % ({name})"
+    text += (
+        f"; at {', '.join(Level(step).label for step in advice.asked)} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})"
+    )
     remedy = f"a finer encoder, or an estimator that simulates the closed loop (estimate.method: {', '.join(CLOSED_LOOP)})"
     return Check(question, graded(error, NEGLIGIBLE, BIASED), text, limit, remedy)
 

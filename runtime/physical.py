@@ -23,12 +23,14 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.errors import InputError, ModelError
+from runtime.estimate import Estimate
 from runtime.model import GeneratedModel, require
 
 Array = np.ndarray
 
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 SIGNED = ("inertia", "viscous", "coulomb")  # kinds of elements whose parameter is not negative
+CERTAIN = 3.0  # deviations
 FORMED = ("inertia", "viscous")  # kinds whose forms must be positive semidefinite
 
 
@@ -99,6 +101,14 @@ def physical_model(model: GeneratedModel, constants: Mapping[str, float] | None 
         conditions=(*_links(emitted.LINKS, standard), *_forms(emitted.ELEMENTS, standard), *_signs(emitted.ELEMENTS, standard)),
         values=dict(model.VALUES),
     )
+
+
+def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
+    """Motor inertias and frictions of their own column that are negative by more than CERTAIN corrected deviations: no drive has them."""
+    elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
+    signed = {name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not _is_form(acts)}
+    sigma = np.fmax(fit.sigma, fit.sigma_corrected)
+    return tuple(name for i, name in enumerate(fit.names) if name in signed and fit.X[i] < -CERTAIN * sigma[i])
 
 
 def pseudo_inertia(ten: Array) -> Array:

@@ -104,8 +104,8 @@ def verdict(shown: Demonstration) -> str:
     steps = ", ".join(f"encoder steps of {' and '.join(labels)} {words[key]}" for key, labels in order.items() if labels)
     label = "SIMULATED record: " if shown.simulated else ""
     return (
-        f"{label}{len(found.found.names)} of {len(found.every.names)} parameters explain the torques of {found.model.NAME} to "
-        f"{found.found.estimate.relative_error:.1f} % and predict an unseen half of the record to {found.predicted_error:.1f} %; by the residual of least squares, "
+        f"{label}{len(found.found.names)} of {len(found.every.names)} parameters leave {found.found.estimate.relative_error:.1f} % of the torques of "
+        f"{found.model.NAME} unexplained, {found.predicted_error:.1f} % on a half of the record that the fit has not seen; by the residual of least squares, "
         f"{steps}."
     )
 

@@ -137,8 +137,8 @@ def verdict(shown: HapticDemonstration) -> str:
         name, error = main_error(level, result.names)
         levels.append(f"{judged(level, result.names)} at {level.level.label} ({name} {error:.2g} %)")
     return (
-        f"SIMULATED record: {len(found.found.names)} of {len(found.every.names)} parameters explain the torques of {found.model.NAME} to "
-        f"{found.found.estimate.relative_error:.1f} %, the worst {max(off):.1f} standard deviations from what was put in; by the main inertia and gravity "
+        f"SIMULATED record: {len(found.found.names)} of {len(found.every.names)} parameters leave {found.found.estimate.relative_error:.1f} % of the "
+        f"torques of {found.model.NAME} unexplained, the worst {max(off):.1f} standard deviations from what was put in; by the main inertia and gravity "
         f"parameters least squares is {'; '.join(levels)}."
     )
 

@@ -32,6 +32,9 @@ def report(
     encoder: Annotated[
         str | None, typer.Option(help="Step of the encoders in use, rad or m, such as 2*pi/65536: judged like every other check.")
     ] = None,
+    side: Annotated[
+        str | None, typer.Option(help="joint or motor: where the encoders stand; default: cestac.side of the study, joint.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print verdict and checks as JSON.")] = False,
 ) -> None:
     """Identify ROBOT from RECORD, with friction, physical consistency and encoder resolution, and judge the result.
@@ -43,10 +46,13 @@ def report(
         from runtime.estimate import json_text
         from runtime.identification import identification
         from runtime.io.streams import records_or_streams
+        from symgen.cli.cestac import changed
         from symgen.cli.identify import identification_files, simulator_of
         from symgen.cli.pages import judged
 
         study, folder = study_with_records(record)
+        if side is not None:
+            study = changed(study, {"side": side})
         records = records_or_streams(study.record, model, study.stream, folder=folder)
         further = records_or_streams(study.validate.record, model, study.stream, folder=folder)
         provenance = origin(records)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from runtime.io.study_files import load_study
 from symgen.cli.main import app
 
 FILES = {"report.html", "estimate.json", "parameters.csv", "study.yaml", "torques.png", "friction.png", "advice.json", "cestac.json"}
@@ -59,6 +60,17 @@ def test_record_that_determines_nothing(record, tmp_path):
     result = run("planar_2r", record, "-o", tmp_path / "out")
     assert result.exit_code == 1 and "not told apart" in result.stdout and "does not determine" in result.stderr
     assert "✕</span> No" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_encoders_at_the_motors(emps_data, tmp_path):
+    """The step of --encoder is one of the motors where --side says so, in the words of the verdict and in study.yaml."""
+    result = run("emps", "emps", "-o", tmp_path / "out", "--encoder", "1e-6", "--side", "motor")
+    assert result.exit_code in (0, 1), result.output
+    assert "at the motors" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    study = load_study(tmp_path / "out" / "study.yaml")
+    assert study.cestac.side == "motor"
+    bad = run("emps", "emps", "-o", tmp_path / "bad", "--side", "shaft")
+    assert bad.exit_code == 2 and "cestac.side: 'shaft'; expected joint or motor" in bad.stderr
 
 
 def test_read_by_blocks(record, tmp_path):

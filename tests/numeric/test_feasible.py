@@ -19,7 +19,7 @@ from runtime.feasibility import Ellipsoid, Limits, feasibility, limit_rows, stan
 from runtime.io.datasets import dataset_study
 from runtime.model import load_model
 from runtime.observation import Observation
-from runtime.physical import INERTIAL, physical_model, pseudo_inertia
+from runtime.physical import INERTIAL, negative_elements, physical_model, pseudo_inertia
 from runtime.study import EstimateSettings
 from runtime.validation import split_validation
 from symgen.description import load_robot
@@ -87,6 +87,15 @@ def test_conditions_of_a_coupled_wrist_and_of_one_sided_friction(tx40) -> None:
     np.testing.assert_array_equal(wrist.matrix(np.array(list(chi.values()))), [[5, 2], [2, 2]])  # robot file: q6**2 + 2*q5*q6 of Ia6
     named = [c.name for c in physical_model(emitted("emps_asymmetric")).conditions]
     assert named == ["link 1", "Ia1", "FVP1", "FVN1", "FSP1", "FSN1"]
+
+
+def test_signs_that_no_drive_has(arm, tx40) -> None:
+    """Friction below zero is named where it is so beyond its deviation; offsets, inertias of sums and forms have no sign of their own."""
+    X = arm.base_parameters(dict.fromkeys(arm.STANDARD_PARAMETERS, 1.0) | {"FS2": -1.0, "OFFSET1": -1.0})
+    for noise, named in ((0.1, ("FS2",)), (1000.0, ())):
+        assert negative_elements(arm, estimate(simulated(arm, X, noise), EstimateSettings(), model=arm)) == named
+    wrist = {*negative_elements(tx40, estimate(simulated(tx40, -np.ones(60), 0.1), EstimateSettings(), model=tx40))}
+    assert {"Ia3", "FV1", "FSM6"} <= wrist and not {"Ia6", "FVM6", "OFFSET1", "ZZ1R"} & wrist
 
 
 @pytest.mark.parametrize("name", ["planar_2r", "tx40"])

@@ -148,8 +148,8 @@ def test_emps_steps_predicted_and_sampled(emps_advice):
 
 def test_advice_in_words_and_json(emps_advice):
     assert (
-        "up to Delta = 4.6e-06 m (M1R first; 40 runs there gave" in emps_advice.verdict
-        or "4.59e-06 m (M1R first; 40 runs" in emps_advice.verdict
+        "up to Delta = 4.6e-06 m at the joints (M1R first; 40 runs there gave" in emps_advice.verdict
+        or "4.59e-06 m at the joints (M1R first; 40 runs" in emps_advice.verdict
     )
     assert emps_advice.worst(0)[1] < 1 < 50 < emps_advice.worst(1)[1] and emps_advice.worst(1)[0] == "M1R"
     data = json.loads(emps_advice.to_json())

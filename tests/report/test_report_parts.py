@@ -103,12 +103,12 @@ def fit(X=(1.0, 2.0), sigma=(0.01, 0.02), correlation=0.0, error=4.0, joints=(3.
     return replace(made, **changed)
 
 
-def identified(estimate, unseen=5.0):
+def identified(estimate, unseen=5.0, negative=()):
     scatter = SimpleNamespace(names=estimate.names, drawn=2.5 * estimate.sigma)
     prediction = SimpleNamespace(fitted=False, columns="essential", relative_error=unseen)
     return SimpleNamespace(
         every=estimate, carried=estimate, found=SimpleNamespace(estimate=estimate), validation=(SimpleNamespace(predictions=(prediction,)),),
-        trust=SimpleNamespace(scatter=scatter), verdict="2 of 2.",
+        trust=SimpleNamespace(scatter=scatter), verdict="2 of 2.", negative=negative,
     )  # fmt: skip
 
 
@@ -140,6 +140,11 @@ def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
     assert set(judgement.summary()) == {"state", "answer", "use", "doubt", "next", "checks"}
 
 
+def test_negative_friction_is_not_for_use():
+    judgement = judge(identified(fit(), negative=("Ia2", "FS2")))
+    assert judgement.state == "no" and "Below zero: Ia2, FS2" in judgement.doubt and "sign of ratio" in judgement.next
+
+
 def test_physical_consistency_counts():
     found = identified(fit())
     bad = SimpleNamespace(feasible=False, blocking=(("link 3", -0.01),), margin=-0.01)
@@ -152,8 +157,11 @@ def test_physical_consistency_counts():
 @pytest.mark.parametrize(("error", "state"), [(0.5, "good"), (3.0, "doubtful"), (8.0, "no")])
 def test_encoder_in_use_counts(error, state):
     limits = [SimpleNamespace(percent=1.0, delta=1e-4), SimpleNamespace(percent=5.0, delta=2e-4)]
-    advice = SimpleNamespace(encoders=[SimpleNamespace(limits=limits)], unit="rad", asked=(1e-3,), worst=lambda k: ("A1", error))
+    advice = SimpleNamespace(
+        encoders=[SimpleNamespace(limits=limits)], unit="rad", place="at the motors", asked=(1e-3,), worst=lambda k: ("A1", error)
+    )
     asked = judge(identified(fit(details={"standard": {}})), advice=advice)
+    assert "5 % up to 0.0002 rad (2*pi/31416) at the motors" in asked.checks[-1].found
     assert asked.state == state and asked.answer == {"good": "Yes", "doubtful": "With care", "no": "No"}[state]
     advice.asked = ()
     judgement = judge(identified(fit()), advice=advice)
