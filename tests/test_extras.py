@@ -1,0 +1,71 @@
+"""Optional libraries: what a message tells the user to install is there, and is what the code then imports."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import packages_distributions, requires
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+FOR_DEVELOPERS = {"test", "docs"}
+INSTALL = re.compile(r"pip install symgen\[([^\]]*)\]")
+WITH_PYTHON = {*sys.stdlib_module_names, "compression", "symgen", "runtime"}  # compression: from 3.14 on
+FILES = sorted(path for package in ("symgen", "runtime") for path in (ROOT / package).rglob("*.py"))
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def libraries(requirements: list[str]) -> set[str]:
+    """Normalised names of requirement strings, those for another extra left out."""
+    wanted = [text.partition(";")[0] for text in requirements if "extra ==" not in text]
+    return {normal(re.split(r"[\s<>=!~\[(]", text.strip(), maxsplit=1)[0]) for text in wanted}
+
+
+def normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+CORE = libraries(PROJECT["dependencies"])
+EXTRAS = {name: libraries(listed) for name, listed in PROJECT["optional-dependencies"].items()}
+OF = packages_distributions()
+
+
+def named_in(path: Path) -> set[str]:
+    """Extras that the text of a file tells the reader to install."""
+    return {name for group in INSTALL.findall(path.read_text(encoding="utf-8")) for name in group.split(",")}
+
+
+def optional_imports(path: Path) -> set[str]:
+    """Top-level packages imported by a file that are neither Python's, nor ours, nor a core dependency."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    names = {alias.name for n in ast.walk(tree) if isinstance(n, ast.Import) for alias in n.names}
+    names |= {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module}
+    return {top for name in names if (top := name.partition(".")[0]) not in WITH_PYTHON and not distributions(top) & CORE}
+
+
+def distributions(package: str) -> set[str]:
+    return {normal(name) for name in OF.get(package, [])}
+
+
+def brought_by(extra: str) -> set[str]:
+    """What installing an extra installs: its libraries, and what those require."""
+    return EXTRAS[extra] | {name for library in EXTRAS[extra] for name in libraries(requires(library) or [])}
+
+
+def test_the_extras_that_messages_name_exist() -> None:
+    named = {path: named_in(path) for path in (*FILES, *PAGES)}
+    assert {path: names - set(EXTRAS) for path, names in named.items() if names - set(EXTRAS)} == {}
+    assert set().union(*(named[path] for path in FILES)) == set(EXTRAS) - FOR_DEVELOPERS
+
+
+@pytest.mark.parametrize("path", [path for path in FILES if optional_imports(path)], ids=lambda path: path.stem)
+def test_a_file_names_the_extra_of_what_it_imports(path: Path) -> None:
+    for package in optional_imports(path):
+        assert any(distributions(package) & brought_by(extra) for extra in named_in(path)), package
+
+
+def test_what_ci_tests_holds_every_extra() -> None:
+    assert {name: listed - EXTRAS["test"] for name, listed in EXTRAS.items() if listed - EXTRAS["test"]} == {}
