@@ -69,6 +69,7 @@ class Checkpoint:
             try:
                 self._write(Runs.joined(self._new, self._new[0].X.shape[1]))
             except OSError as e:
+                self._leave_no_empty_folder()
                 raise InputError(
                     f"cannot be written: {e.strerror or e}; {self.written} runs are safe, make room and repeat the command to go on",
                     file=str(self.folder),
@@ -80,6 +81,9 @@ class Checkpoint:
         """Delete the archives, when their runs are told elsewhere."""
         for path in [*self._archives(), self.folder / STUDY]:
             path.unlink(missing_ok=True)
+        self._leave_no_empty_folder()
+
+    def _leave_no_empty_folder(self) -> None:
         with suppress(OSError):  # not empty, or not there
             self.folder.rmdir()
 

@@ -117,7 +117,7 @@ def test_full_disk(tmp_path, whole):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 1
     assert "InputError" in errors and "File too large; 0 runs are safe" in errors
-    assert files(tmp_path) == []
+    assert list(tmp_path.iterdir()) == []
     assert same_bits(cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path)), whole)
 
 
