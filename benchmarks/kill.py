@@ -53,22 +53,24 @@ controller:
 """
 
 
-def write_record(path: Path, seed: int, duration: float = 4.0, rate: float = 500.0) -> None:
-    """Positions and torques of the packaged arm on sums of sines, noise on the torques."""
+def write_record(path: Path, seed: int, robot: str = ROBOT, duration: float = 4.0, rate: float = 500.0) -> None:
+    """Positions and torques of a packaged robot on sums of sines, noise on the torques."""
     with TemporaryDirectory() as folder:
-        module = Path(folder) / f"{ROBOT}.py"
-        module.write_text(generate_module(load_robot(ROBOT)), encoding="utf-8")
+        module = Path(folder) / f"{robot}.py"
+        module.write_text(generate_module(load_robot(robot)), encoding="utf-8")
         model = load_model(module)
         generator = np.random.default_rng(seed)
         t = np.arange(int(duration * rate)) / rate
         w = 2 * np.pi * np.array([0.5, 1.25, 2.5])
-        phase = generator.uniform(0, 2 * np.pi, (2, 3))
+        n = len(model.JOINTS)
+        phase = generator.uniform(0, 2 * np.pi, (n, 3))
         angle = t[:, None, None] * w + phase
         amplitude = np.array([0.8, 0.4, 0.2])
         q, qd, qdd = ((amplitude * x).sum(-1) for x in (np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)))
         X = 1.0 + np.arange(len(model.BASE_PARAMETERS)) / 4
         tau = model.inverse_dynamics(q, qd, qdd, X) + 0.05 * generator.standard_normal(q.shape)
-    np.savetxt(path, np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="", fmt="%.12g")
+    header = ",".join(["t", *(f"{name}{j + 1}" for name in ("q", "tau") for j in range(n))])
+    np.savetxt(path, np.column_stack([t, q, tau]), delimiter=",", header=header, comments="", fmt="%.12g")
 
 
 class Job:
@@ -94,6 +96,8 @@ def jobs(folder: Path) -> dict[str, Job]:
     """The commands, over files made in `folder`."""
     write_record(folder / "old.csv", seed=1)
     write_record(folder / "new.csv", seed=2)
+    for which, seed in (("old", 1), ("new", 2)):
+        write_record(folder / f"{which}-axis.csv", seed, robot="emps")
     text = (files("symgen.description") / "robots" / f"{ROBOT}.yaml").read_text(encoding="utf-8")
     for which, gravity in (("old", "9.81"), ("new", "9.80665")):
         (folder / which).mkdir()
@@ -103,6 +107,7 @@ def jobs(folder: Path) -> dict[str, Job]:
     pairs = {which: [ROBOT, f"{which}.csv", *out] for which in ("old", "new")}
     robots = {which: [f"{which}/arm.yaml", "emps", "--target", "numpy,casadi,c,xp", *out] for which in pairs}
     study = {which: [*pairs[which], "--delta", "2*pi/5000", "--delta", "2*pi/1000", "--runs", "150"] for which in pairs}
+    axis = {which: ["emps", f"{which}-axis.csv", *out] for which in pairs}
     loops = {which: ["emps", f"{which}/loop.yaml", *out] for which in pairs}
     search = {which: [ROBOT, "--starts", "1", "--seed", seed, *out] for which, seed in (("old", "1"), ("new", "2"))}
     other = {which: [f"{which}/arm.yaml", "OUT/other.yaml", "--force"] for which in pairs}
@@ -111,7 +116,7 @@ def jobs(folder: Path) -> dict[str, Job]:
         "convert": Job(folder, "convert", **other),
         "identify": Job(folder, "identify", **pairs),
         "cestac": Job(folder, "cestac", **study, code=OFTEN),
-        "report": Job(folder, "report", **pairs),
+        "report": Job(folder, "report", **axis),
         "simulate": Job(folder, "simulate", **loops),
         "excite": Job(folder, "excite", **search),
     }
