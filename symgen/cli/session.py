@@ -47,13 +47,15 @@ def reported_errors() -> Iterator[None]:
         raise
     except BrokenPipeError:
         _stop_printing()
+    except SymgenError as e:
+        fail(str(e))
+    except OSError as e:
+        fail(f"{e.filename or 'cannot print, or write a temporary file'}: {e.strerror or e}")
     except Exception as e:
         from runtime.errors import DataUnavailableError, InputError  # not before it is needed: runtime takes most of a second to load
 
-        if isinstance(e, InputError | SymgenError):
+        if isinstance(e, InputError):
             fail(str(e), lines=isinstance(e, DataUnavailableError))
-        if isinstance(e, OSError):
-            fail(f"{e.filename or 'cannot print, or write a temporary file'}: {e.strerror or e}")
         raise
 
 

@@ -3,6 +3,7 @@
 import os
 import resource
 import signal
+import subprocess
 import sys
 
 import pytest
@@ -140,3 +141,32 @@ def test_nothing_written_leaves_no_folder(tmp_path):
     with pytest.raises(KeyError), reserved(tmp_path / "new folder" / "größe"):
         raise KeyError
     assert list(tmp_path.iterdir()) == []
+
+
+LONG = {  # whose results take long: arguments before the folder
+    "identify": ["planar_2r", "run.csv"],
+    "cestac": ["planar_2r", "run.csv"],
+    "report": ["planar_2r", "run.csv"],
+    "excite": ["planar_2r"],
+    "simulate": ["emps", "loop.yaml"],
+    "fleet": ["fleet.yaml"],
+    "demo": [],
+}
+
+
+def test_long_commands_learn_at_once_that_they_cannot_write(tmp_path):
+    """One line, exit code 2, before what computes is even loaded."""
+    (tmp_path / "file").write_text("mine")
+    code = f"""
+import sys
+from typer.testing import CliRunner
+from symgen.cli.main import app
+for verb, arguments in {LONG}.items():
+    done = CliRunner().invoke(app, [verb, *arguments, "-o", "file"])
+    assert done.exit_code == 2 and done.stderr.startswith("error: file: cannot be written: File exists") and done.stderr.count("\\n") == 1, done.output
+print(*sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert not {name.partition(".")[0] for name in done.stdout.split()} & {"numpy", "runtime", "casadi", "matplotlib"}
+    assert [path.name for path in tmp_path.iterdir()] == ["file"] and (tmp_path / "file").read_text() == "mine"
