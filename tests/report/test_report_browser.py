@@ -80,6 +80,17 @@ def test_structure(browser, folder, verb):
     assert len(ids) == len(set(ids))
 
 
+def test_axes_tell_a_scale_and_texts_stay_in_their_cells(shown):
+    """Two labels at least on either vertical axis of every chart; no text, such as a hash, that leaves its cell."""
+    labels = "[...document.querySelectorAll('.plot svg')].map((s) => [...s.querySelectorAll('text[text-anchor=end]')].map((n) => Number(n.getAttribute('y'))))"
+    for places in shown.run(labels):
+        assert sum(y < 190 for y in places) >= 2 and sum(y > 190 for y in places) >= 2
+    assert (
+        shown.run("[...document.querySelectorAll('td, th')].filter((n) => n.scrollWidth > n.clientWidth + 1).map((n) => n.textContent)")
+        == []
+    )
+
+
 def test_verdict_is_said_in_words_and_first(shown, page):
     answer = shown.run("document.querySelector('.answer').textContent.trim()")
     assert answer.split()[0] in "✓!✕" and answer[1:].strip() in ("Yes", "Yes, as far as judged", "With care", "No")
