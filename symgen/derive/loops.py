@@ -187,7 +187,13 @@ def find_relations(robot: Robot) -> Found:
         if wanted and attempt == 0:
             break
     if general is None:
-        raise _cannot_close(robot, equations)
+        general = equations.solve(equations.closest()[2])  # the actuators moved too: short jacks fit no pose drawn at random
+        if general is None:
+            raise _cannot_close(robot, equations)
+        _check_mobility(robot, equations, general)
+        found = _linear(robot, equations, relations, general)
+        if found is not None:
+            return found
     return _general(robot, equations, relations, general)
 
 

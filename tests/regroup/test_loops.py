@@ -226,6 +226,28 @@ def test_certified_and_every_perturbed_coefficient_caught(name: str) -> None:
 # --- mechanisms that cannot be -----------------------------------------------------------------------------------------
 
 
+JACK = b"""
+symgen: 1
+name: jack
+gravity: [0, -g, 0]
+constants: {g: 9.81, D2: 0.003, D4: 0.002}
+frames:
+  1: {ant: 0, sigma: 0, mu: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 0, sigma: 0, mu: 0, alpha: 0, d: D2, theta: q2, r: 0}
+  3: {ant: 2, sigma: 1, mu: 1, alpha: pi/2, d: 0, theta: 0, r: q3}
+  4: {ant: 3, sigma: 0, mu: 0, alpha: -pi/2, d: 0, theta: q4, r: 0}
+  5: {ant: 1, sigma: 2, mu: 0, alpha: 0, d: D4, theta: 0, r: 0}
+loops:
+  - {cut: 4, twin: 5}
+"""
+
+
+def test_jack_that_fits_no_stroke_drawn_at_random() -> None:
+    """A boom of 2 mm on a jack of 1 to 5 mm: the base parameters are those of the same mechanism a hundred times as large, where strokes of metres fit."""
+    names = [[b.name for b in regroup(parse_robot(text, "jack.yaml")).base] for text in (JACK, JACK.replace(b"0.00", b"0."))]
+    assert names[0] == names[1] and "ZZ1R" in names[0]
+
+
 def test_frames_that_cannot_coincide() -> None:
     """alpha5 = +pi/2 in Table 5: the two planes are turned against each other."""
     with pytest.raises(DescriptionError, match=r"frame 7 \(cut\) and frame 8 \(twin\) cannot coincide; they come as close as 1\.86"):
