@@ -103,7 +103,7 @@ def _numbered(quantity: str, table: Named) -> tuple[str, ...]:
     found = sorted((int(m[1]), name) for name in table.names if (m := re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name)))
     if not found:
         raise InputError(
-            f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name them in record.columns.{quantity}",
+            f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name them in a study file, record.columns.{quantity}",
             file=table.file,
         )
     return tuple(name for _, name in found)

@@ -105,6 +105,8 @@ def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> tupl
         raise InputError("a bag within .gz; uncompress it", file=str(path))
     if not path.exists():
         raise InputError("cannot be read: no such file", file=str(path))
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        raise InputError("a folder without metadata.yaml, hence no ROS 2 bag; name the measured or study file in it", file=str(path))
     return read_bag(path, topic)
 
 

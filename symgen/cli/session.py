@@ -87,9 +87,12 @@ def opened_model(robot: str) -> Iterator[GeneratedModel]:
     if Path(robot).suffix == ".py":
         yield load_model(Path(robot))
         return
+    from runtime.io.table import is_measured
     from symgen.description import load_robot
     from symgen.emit import generate_module
 
+    if Path(robot).is_file() and is_measured(Path(robot)):
+        fail(f"{robot}: a measured file, where a robot is expected; the robot comes first, then the record")
     description = load_robot(robot)
     text = generate_module(description)
     with TemporaryDirectory(prefix="symgen-") as folder:

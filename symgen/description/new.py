@@ -33,6 +33,7 @@ elements:
 # drives: {{ratio: [[100, 0], [0, 100]], offset: [0, 0], torque_constant: [1, 1]}}
 
 # For exciting trajectories: q as [lower, upper] or one number for +-; qd, qdd, tau as largest values.
+# SI, of the joint: a motor of 3000 rpm behind a ratio of 100 allows 3000*2*pi/60/100 rad/s.
 # limits: {{q: [pi, [-pi/2, pi/2]], qd: [3, 3], qdd: [10, 10], tau: [50, 20]}}
 
 # Standard parameters you know, for simulation; inertia about the origin of the link frame.

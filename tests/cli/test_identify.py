@@ -47,6 +47,20 @@ def test_emps_digits(emps):
     ]
 
 
+def test_arguments_exchanged_or_no_record_at_all(tmp_path):
+    """The robot comes first; a folder of results is no bag; a header of other names asks for a study file."""
+    for name, text in (("log.csv", "time,a,b\n0,1,2\n"), ("robot.yaml", "symgen: 1\n")):
+        (tmp_path / name).write_text(text)
+    (tmp_path / "results").mkdir()
+    for arguments, said in (
+        ((tmp_path / "log.csv", tmp_path / "robot.yaml"), "the robot comes first, then the record"),
+        (("emps", tmp_path / "results"), "no ROS 2 bag; name the measured or study file in it"),
+        (("emps", tmp_path / "log.csv"), "no columns q1, q2 ... among time, a, b; name them in a study file, record.columns.q"),
+    ):
+        result = run(*arguments)
+        assert result.exit_code == 2 and said in result.stderr
+
+
 def test_files_are_complete_and_readable(emps):
     _, folder = emps
     assert {path.name for path in folder.iterdir()} == FILES
