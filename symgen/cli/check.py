@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from symgen.cli.doubts import tell_doubts
 from symgen.cli.session import NEGATIVE, reported_errors, single_thread
 
 if TYPE_CHECKING:
@@ -27,7 +28,9 @@ def check(
         from symgen.regroup.certificate import certify
         from symgen.regroup.regrouping import regroup
 
-        regrouping = regroup(load_robot(robot))
+        described = load_robot(robot)
+        tell_doubts(described)
+        regrouping = regroup(described)
         document = certify(regrouping).mapping() | {"method": regrouping.method} | numeric(regrouping)
         document["valid"] = document["valid"] and document["numeric_valid"]
         typer.echo(as_json(document) if json else as_text(regrouping, document))

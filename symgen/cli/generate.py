@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from symgen.cli.doubts import tell_doubts
 from symgen.cli.session import NEGATIVE, fail, reported_errors
 from symgen.cli.writing import write_all
 
@@ -47,6 +48,7 @@ def emitted(robots: list[str], targets: Sequence[str] = ("numpy",)) -> dict[str,
     modules: dict[str, str] = {}
     for source in packaged_robots() if robots == ["all"] else robots:
         robot = load_robot(source)
+        tell_doubts(robot)
         command = Path(source).name if source.endswith((".yaml", ".yml", ".par", ".urdf")) else source
         files = generate_files(robot, targets=targets, command=command)
         if modules.keys() & files.keys():

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from symgen.cli.doubts import tell_doubts
 from symgen.cli.session import fail, reported_errors
 from symgen.cli.writing import write_all
 
@@ -45,15 +46,18 @@ def show(
             fail("-o names the file of --html; the other formats are printed")
         kind = "json" if json else format
         if kind not in FORMATS:
-            fail(f"format {kind!r}; expected one of {', '.join(FORMATS)}")
+            fail(f"format {kind!r}; expected one of {', '.join(FORMATS)}{'; the page is --html' if kind == 'html' else ''}")
         if recursive and (kind != "text" or only):
             fail("--recursive prints every step as text; leave out --format and --only")
         from symgen.description import load_robot
         from symgen.regroup.regrouping import regroup
 
-        regrouping = regroup(load_robot(robot))
+        described = load_robot(robot)
+        tell_doubts(described)
+        regrouping = regroup(described)
         if only is not None and only not in regrouping.names:
-            close = difflib.get_close_matches(only, regrouping.names, n=5, cutoff=0.4)
+            same = [name for name in regrouping.names if name.lower() == only.lower()]
+            close = same or difflib.get_close_matches(only, regrouping.names, n=5, cutoff=0.4)
             fail(
                 f"{only!r} is no base parameter of {regrouping.robot.name}; close: {', '.join(close) or 'none'} (all: symgen show {robot})"
             )
@@ -71,7 +75,9 @@ def write_page(robot: str, output: Path | None) -> Path:
     from symgen.regroup.regrouping import regroup
     from symgen.report.page import robot_page
 
-    regrouping = regroup(load_robot(robot))
+    described = load_robot(robot)
+    tell_doubts(described)
+    regrouping = regroup(described)
     path = output or Path(f"{regrouping.robot.name}.html")
     return write_all(path.parent, {path.name: robot_page(regrouping)})[0]
 
@@ -94,7 +100,7 @@ def flat_text(regrouping: Regrouping, only: str | None) -> str:
         return "\n".join(lines)
     alone = " ".join(b.name for b in base if b.name == b.own)
     return "\n".join(
-        [title(regrouping), "", *lines, "", *wrapped("as they are: " + alone, ""), "", *wrapped("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""), "",
+        [title(regrouping), "", *relation_lines(regrouping), *lines, "", *wrapped("as they are: " + alone, ""), "", *wrapped("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""), "",
          "operations per sample", *operation_lines(regrouping)]
     )  # fmt: skip
 
@@ -117,7 +123,18 @@ def print_coloured(regrouping: Regrouping, only: str | None, recursive: bool, as
         console.print(title(regrouping), style="bold", markup=False)
         alone = [b.name for b in base if b.name == b.own]
         lists = [text.listed(head, names) for head, names in (("as they are", alone), ("no effect", regrouping.no_effect)) if names]
-        lines = ["", *lines, "", *lists, "", text.legend(), "", "operations per sample", *operation_lines(regrouping)]
+        lines = [
+            "",
+            *relation_lines(regrouping),
+            *lines,
+            "",
+            *lists,
+            "",
+            text.legend(),
+            "",
+            "operations per sample",
+            *operation_lines(regrouping),
+        ]
     for line in lines:
         console.print(line, soft_wrap=True, markup=False)
     return True
@@ -127,6 +144,14 @@ def title(regrouping: Regrouping) -> str:
     """What the robot is and how many of its parameters are base ones."""
     robot = regrouping.robot
     return f"{robot.title or robot.name}: {len(regrouping)} base parameters of {len(robot.parameters)}, {regrouping.method}"
+
+
+def relation_lines(regrouping: Regrouping) -> list[str]:
+    """The passive joints as functions of others, and an empty line; nothing where there are none."""
+    from symgen.emit.header import loop_lines
+
+    robot = regrouping.robot
+    return [f"passive: {line}" for line in loop_lines(robot)[len(robot.loops) :]] + [""] if robot.passive else []
 
 
 def operation_lines(regrouping: Regrouping) -> list[str]:

@@ -1,0 +1,62 @@
+"""Notes on robots that are valid but probably not what was meant, and the relations that `show` prints."""
+
+import pytest
+from typer.testing import CliRunner
+
+from symgen.cli.doubts import equal_sides, nearly_round
+from symgen.cli.main import app
+from symgen.description import load_robot, packaged_robots, parse_robot
+
+TWO_BARS = """\
+symgen: 1
+name: bars
+gravity: [0, -g, 0]
+constants: {L1: 0.4, L2: 0.3, L3: 0.4, L4: 0.3, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0,        alpha: 0, d: 0,  theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, mu: 0, alpha: 0, d: L1, theta: q2, r: 0}
+  3: {ant: 0, sigma: 0, mu: 0, alpha: 0, d: L4, theta: q3, r: 0}
+  4: {ant: 3, sigma: 0, mu: 0, alpha: 0, d: L3, theta: q4, r: 0}
+  5: {ant: 2, sigma: 2,        alpha: 0, d: L2, theta: 0,  r: 0}
+loops: [{cut: 4, twin: 5}]
+"""
+
+
+def robot(text):
+    return parse_robot(text.encode(), "bars.yaml")
+
+
+def test_equal_sides_under_two_names_are_told():
+    (note,) = equal_sides(robot(TWO_BARS))
+    assert "frames 4 and 5" in note and "L1 and L3, L2 and L4 are equal" in note
+
+
+def test_a_parallelogram_and_unequal_sides_are_not():
+    assert equal_sides(robot(TWO_BARS.replace("d: L3", "d: L1").replace("d: L4", "d: L2"))) == []
+    assert equal_sides(robot(TWO_BARS.replace("L3: 0.4, L4: 0.3", "L3: 0.41, L4: 0.32"))) == []
+
+
+@pytest.mark.parametrize("name", packaged_robots())
+def test_packaged_robots_raise_no_doubt(name):
+    described = load_robot(name)
+    assert nearly_round(described) == [] and equal_sides(described) == []
+
+
+@pytest.mark.parametrize(("angle", "meant"), [("1.5708", "pi/2"), ("-1.5707963", "-pi/2"), ("0.7854", "pi/4"), ("0.0001", "0")])
+def test_decimals_for_round_angles_are_told(tmp_path, angle, meant):
+    (tmp_path / "bars.yaml").write_text(TWO_BARS[: TWO_BARS.index("  2:")].replace("alpha: 0", f"alpha: {angle}"))
+    for verb in ("show", "check", "generate"):
+        result = CliRunner().invoke(app, [verb, str(tmp_path / "bars.yaml"), *(["-o", str(tmp_path)] if verb == "generate" else [])])
+        assert result.exit_code == 0
+        assert result.stderr.startswith("note: frame 1: alpha has") and f", not {meant}: another robot" in result.stderr
+
+
+def test_show_prints_the_passive_joints():
+    lines = CliRunner().invoke(app, ["show", "sr400"]).stdout.splitlines()
+    relations = [line for line in lines if line.startswith("passive: ")]
+    assert len(relations) == len(load_robot("sr400").passive)
+    assert all(" = " in line for line in relations)
+
+
+def test_show_finds_a_name_in_other_capitals():
+    assert "close: ZZ1R" in CliRunner().invoke(app, ["show", "planar_2r", "--only", "zz1r"]).stderr
