@@ -18,12 +18,23 @@ import runtime
 import symgen
 
 SYMGEN = str(Path(sys.executable).with_name("symgen"))
-EXTRAS = {  # extra: a command that needs it
-    "consistency": ["identify", "planar_2r", "run.csv", "--physical"],
-    "scale": ["cestac", "planar_2r", "run.csv", "--scheduler", "tcp://127.0.0.1:9", "--delta", "1e-3", "--runs", "2"],
-    "tables": ["identify", "planar_2r", "run.parquet"],
-    "bags": ["identify", "planar_2r", "run.bag"],
-}
+EXTRAS = (  # extra, a command that needs it
+    ("consistency", ["identify", "planar_2r", "run.csv", "--physical"]),
+    ("scale", ["cestac", "planar_2r", "run.csv", "--scheduler", "tcp://127.0.0.1:9", "--delta", "1e-3", "--runs", "2"]),
+    ("tables", ["identify", "planar_2r", "run.parquet"]),
+    ("tables", ["identify", "planar_2r", "run.mat"]),
+    ("bags", ["identify", "planar_2r", "run.bag"]),
+    ("mjcf", ["check", "arm.xml"]),
+    ("gpu", ["identify", "models/planar_2r_xp.py", "run.csv"]),
+)
+LOOP = """symgen: 1
+controller:
+  law: {kind: cascade, kp: 160.18, kv: 243.45, gain: 35.15}
+  rate: 1000
+  reference:
+    limits: ignore
+    motion: {parts: [{family: fourier, period: 1.0, harmonics: 2, p: [[0.0, 0.01, -0.01, 0.002, 0.003]]}]}
+"""
 
 
 def command(*arguments: str, code: int = 0) -> str:
@@ -51,6 +62,9 @@ def main() -> None:
     table = np.column_stack([t, q, 5 * np.cos(2 * t), np.sin(5 * t)])
     np.savetxt("run.csv", table, delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
     Path("run.parquet").write_bytes(b"PAR1" + bytes(16) + b"PAR1")
+    Path("run.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(384) + b"\x89HDF\r\n\x1a\n" + bytes(64))
+    Path("arm.xml").write_text("<mujoco/>", encoding="utf-8")
+    Path("loop.yaml").write_text(LOOP, encoding="utf-8")
     Path("run.bag").write_bytes(b"#ROSBAG V2.0\n" + bytes(64))
 
     command("--version")
@@ -64,10 +78,12 @@ def main() -> None:
     json.loads(Path("found/estimate.json").read_text(encoding="utf-8"))
     command("cestac", "planar_2r", "run.csv", "-o", "steps", "--delta", "1e-6", "--runs", "5")
     command("report", "planar_2r", "run.csv", "-o", "report", "--help")
+    command("simulate", "emps", "loop.yaml", "-o", "loop")
+    command("snippet", "emps", "-o", "use")
     command("datasets")
     command("schema")
     if "--extras" not in sys.argv:
-        for extra, arguments in EXTRAS.items():
+        for extra, arguments in EXTRAS:
             said = command(*arguments, code=2)
             if f"pip install symgen[{extra}]" not in said:
                 sys.exit(f"symgen {' '.join(arguments)} does not name its extra: {said}")
