@@ -14,6 +14,7 @@ from __future__ import annotations
 import ast
 import builtins
 import re
+import warnings
 from dataclasses import dataclass, field
 
 from runtime.errors import ModelError
@@ -59,7 +60,9 @@ def check_source(text: str, file: str) -> None:
     if len(text) > LONGEST or sum(1 for _ in re.finditer(r"\w+|[^\w\s]", text)) > MOST_WORDS:
         raise ModelError(f"{len(text)} characters; an emitted model has at most {LONGEST}, and {MOST_WORDS} words and marks", file=file)
     try:
-        tree = ast.parse(text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # what a compiler remarks on, an emitter has not written
+            tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as e:
         raise ModelError(f"not Python: {e}", file=file) from None
     _Shape(tree, file).check()

@@ -7,6 +7,7 @@ refused by name. Arrays of version 7.3 are stored by columns, so that h5py shows
 from __future__ import annotations
 
 import struct
+import warnings
 import zlib
 from collections.abc import Mapping
 from io import BytesIO
@@ -39,8 +40,11 @@ def read_mat(data: bytes, file: str) -> ArrayTable:
     try:
         if 0 not in data[:4]:
             raise ValueError("its first 128 bytes are of no version")
-        return ArrayTable(file, numeric(scipy.io.loadmat(BytesIO(data))))  # version 4
-    except DAMAGED as e:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of texts and sparse matrices, which are not read
+            warnings.simplefilter("error", UserWarning)  # numbers as VAX computers stored them
+            return ArrayTable(file, numeric(scipy.io.loadmat(BytesIO(data))))  # version 4
+    except (*DAMAGED, UserWarning) as e:
         raise InputError(f"not a MATLAB file ({first_line(e)})", file=file) from e
 
 

@@ -98,6 +98,8 @@ def _values(file: Path) -> dict[str, float]:
             fail(f"{file}, line {line}: found {','.join(row)[:60]!r}; expected name,value")
         if not isfinite(found[name]):
             fail(f"{file}, line {line}: {name[:60]} is {value[:60]}; expected a finite number")
+    if not found:
+        fail(f"{file}: no values; expected lines of name,value")
     return found
 
 

@@ -60,10 +60,10 @@ class Results:
         with _clear_errors(self.folder):
             self.recover()
             for name in contents:
-                if (self.folder / name).is_dir():
-                    raise OutputError(
-                        f"{self.folder / name}: a folder is where a file is to be written; rename it, or choose another place"
-                    )
+                path = self.folder / name
+                if path.exists() and not path.is_file():  # a device would be replaced by a file, for every program
+                    what = "a folder" if path.is_dir() else "a pipe or a device"
+                    raise OutputError(f"{path}: {what} is where a file is to be written; rename it, or choose another place")
             unfinished.mkdir()
             try:
                 for name, content in contents.items():

@@ -15,6 +15,7 @@ import shutil
 import tempfile
 import traceback
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic, process_time
@@ -131,7 +132,8 @@ class Reader:
             self.close()
             self._start()
         self.served += 1
-        self.pipe.send((name, content))
+        with suppress(BrokenPipeError):  # then its end is met below
+            self.pipe.send((name, content))
         begun, used = monotonic(), self._used()
         while not self.pipe.poll(0.2):
             if self._used() - used > self.seconds + START * (self.served == 1) or monotonic() - begun > WAIT:
@@ -139,7 +141,7 @@ class Reader:
                 return Outcome("hang", "waits" if monotonic() - begun > WAIT else "computes", f"more than {self.seconds} s")
         try:
             outcome = self.pipe.recv()
-        except EOFError:
+        except (EOFError, ConnectionError):
             self.process.join()
             code = self.process.exitcode
             self.close()
