@@ -47,6 +47,27 @@ Array = np.ndarray
 COUPLINGS: tuple[Coupling, ...] = ("both", "position", "torque", "none")
 
 
+LOST = 25.0
+"""Relative error of a joint in %, above which it is asked whether the removed parameters explained it."""
+
+
+def lost_joints(every: Estimate, carried: Estimate) -> str:
+    """What was lost with the parameters that were removed, and what to do; "" where every joint keeps its own.
+
+    The threshold of the essential parameters looks at ||Y - W X|| of all joints. Without weights a joint of large forces rules it, such as a lift
+    in N beside a wrist in N m.
+    """
+    whole = {fit.joint: fit.relative_error for fit in every.per_joint}
+    lost = [fit for fit in carried.per_joint if fit.relative_error > max(LOST, 2 * whole.get(fit.joint, np.inf))]
+    if not lost:
+        return ""
+    weighted = any(fit.scale != 1.0 for fit in every.per_joint)
+    remedy = "lower essential.threshold" if weighted else "weigh the joints by their noise (estimate: {method: wls})"
+    every_left = " and ".join(f"{whole[fit.joint]:.1f} % of joint {fit.joint}" for fit in lost)
+    left = " and ".join(f"{fit.relative_error:.1f} %" for fit in lost)
+    return f"all parameters leave {every_left} unexplained, the essential ones {left}: parameters of small torques were removed beside large forces; {remedy}"
+
+
 @dataclass(frozen=True, eq=False)
 class Identification:
     """Results on one robot.
@@ -136,7 +157,8 @@ class Identification:
             f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: a sign of the joint is wrong (ratio, torque constant or "
             "column), or its coupling, unit or frame."
         )
-        return (*([signs] if self.negative else []), *self.weak.warnings)
+        lost = lost_joints(self.every, self.carried)
+        return (*([signs] if self.negative else []), *([f"{lost}."] if lost else []), *self.weak.warnings)
 
     @property
     def negative(self) -> tuple[str, ...]:

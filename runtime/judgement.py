@@ -20,7 +20,7 @@ from runtime.advice import Advice, step_text
 from runtime.cestac_result import BIASED, NEGLIGIBLE, Level
 from runtime.estimate import Estimate
 from runtime.estimators import CLOSED_LOOP
-from runtime.identification import Identification
+from runtime.identification import Identification, lost_joints
 from runtime.physical import CERTAIN
 from runtime.validation import CORRELATION
 
@@ -145,7 +145,10 @@ def every_joint(found: Identification) -> list[Check]:
         return []
     worst = max(joints, key=lambda joint: joint.relative_error)
     text = f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained"
-    remedy = f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, time shift between position and torque"
+    remedy = (
+        lost_joints(found.every, found.carried)
+        or f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, time shift between position and torque"
+    )
     return [Check("On every joint?", graded(worst.relative_error, *JOINT), text, f"{JOINT[0]:g} % (usable to {JOINT[1]:g} %)", remedy)]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from runtime.estimate import Estimate, JointFit
+from runtime.identification import lost_joints
 from runtime.judgement import apart, graded, judge
 from runtime.model import load_model
 from runtime.report.markup import split, symbol, unit
@@ -187,3 +188,19 @@ def test_roles_tell_the_order_of_removal():
     assert roles_of(found) == {
         "A1": "essential", "B1": "essential, the next to go: ratio 1.0500", "C1": "removed no. 1, ratio 1.0010", "D1": "removed no. 2, ratio 1.0100",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(("scale", "remedy"), [(1.0, "{method: wls}"), (0.2, "lower essential.threshold")])
+def test_a_joint_lost_with_the_removed_parameters_is_told(scale, remedy):
+    """A lift in N beside a wrist in N m: all parameters explain the wrist, the essential ones do not."""
+    every = fit(joints=(2.0, 15.5))
+    every = replace(every, per_joint=tuple(replace(joint, scale=scale) for joint in every.per_joint))
+    found = identified(fit(joints=(2.0, 99.0)))
+    found.every = every
+    judgement = judge(found)
+    assert (
+        judgement.state == "no"
+        and "15.5 % of joint 2 unexplained, the essential ones 99.0 %" in judgement.next
+        and remedy in judgement.next
+    )
+    assert lost_joints(every, every) == "" and lost_joints(fit(joints=(2.0, 80.0)), fit(joints=(2.0, 99.0))) == ""
