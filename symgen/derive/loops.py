@@ -188,9 +188,8 @@ def find_relations(robot: Robot) -> Found:
             break
     if general is None:
         general = equations.solve(equations.closest()[2])  # the actuators moved too: short jacks fit no pose drawn at random
-        if general is None:
+        if general is None or equations.mobility(general) != (len(robot.joints), 0):
             raise _cannot_close(robot, equations)
-        _check_mobility(robot, equations, general)
         found = _linear(robot, equations, relations, general)
         if found is not None:
             return found
