@@ -262,7 +262,7 @@ def parameters_of(model: GeneratedModel, controller: Controller) -> Array:
     values = {**dict.fromkeys(model.NO_EFFECT, 0.0), **model.VALUES, **controller.values}  # type: ignore[attr-defined]
     if missing := [name for name in model.STANDARD_PARAMETERS if name not in values]:  # type: ignore[attr-defined]
         raise SettingsError(
-            f"{model.NAME} has no value of {', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the robot file or here",
+            f"{model.NAME} has no value of {', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the robot file or here, 0 where one is zero",
             path=("controller", "values"),
         )
     if unknown := sorted(set(controller.values) - set(values.keys() & set(model.STANDARD_PARAMETERS))):  # type: ignore[attr-defined]

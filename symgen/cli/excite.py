@@ -105,7 +105,9 @@ def _known(model: GeneratedModel, study: Study, settings: ExcitationSettings, re
             raise InputError(f"{model.NAME} has no `values`; give a RECORD whose estimate tells the size of the parameters")
         values = dict.fromkeys(functions.NO_EFFECT, 0.0) | values
         if missing := [name for name in functions.STANDARD_PARAMETERS if name not in values]:
-            raise InputError(f"`values` of {model.NAME} lack {', '.join(missing)}; give them, or a RECORD whose estimate tells them")
+            raise InputError(
+                f"`values` of {model.NAME} lack {', '.join(missing)}; give them (0 where one is zero), or a RECORD whose estimate tells them"
+            )
         X = np.asarray(functions.base_parameters(values))
         return Known(study, X, "values of the robot file", weights_of(model, settings, dict(zip(model.BASE_PARAMETERS, X, strict=True))))
     seen = stack([observe(model, record, study) for record in records])

@@ -65,19 +65,19 @@ class FrameRow(_Table):
     ant: int = Field(description="antecedent frame, 0 for the base")
     sigma: int = Field(description="0 revolute, 1 prismatic, 2 fixed")
     mu: int | None = Field(default=None, description="1 actuated, 0 passive; default 1, for a fixed frame 0")
-    gamma: Symbolic = "0"
-    b: Symbolic = "0"
-    alpha: Symbolic
-    d: Symbolic
-    theta: Symbolic
-    r: Symbolic
+    gamma: Symbolic = Field(default="0", description="rotation about z of the antecedent frame first, rad; of trees and loops only")
+    b: Symbolic = Field(default="0", description="distance along that z, m; of trees and loops only")
+    alpha: Symbolic = Field(description="angle between the z axes, about x, rad: pi/2")
+    d: Symbolic = Field(description="distance between the z axes, along x, m: D2")
+    theta: Symbolic = Field(description="angle between the x axes, about z_j, rad; q1 or q1 + pi/2 where sigma is 0")
+    r: Symbolic = Field(description="distance between the x axes, along z_j, m; q1 or q1 + R1 where sigma is 1")
 
 
 class LoopRow(_Table):
     """A closed loop: frame `twin`, fixed, coincides with the frame of the cut joint."""
 
-    cut: int
-    twin: int
+    cut: int = Field(description="number of the cut joint: passive, without a link")
+    twin: int = Field(description="number of the fixed frame (sigma 2) at the same place on the other branch")
     start: dict[str, Number] = Field(default={}, description="picks the assembly mode: {q3: 1.2}")
 
 
@@ -85,7 +85,9 @@ class ElementTable(_Table):
     """Inertia, friction, offset or spring on the joint coordinates."""
 
     kind: str = Field(description=f"one of {', '.join(KINDS)}", json_schema_extra={"enum": list(KINDS)})
-    along: Literal["all"] | dict[int, Symbolic] = Field(default={}, description="{6: q5 + q6}, or all: every actuated joint")
+    along: Literal["all"] | dict[int, Symbolic] = Field(
+        default={}, description="{6: q5 + q6} (6 numbers the parameter, FSM6), or all: every actuated joint"
+    )
     form: dict[int, Symbolic] = Field(default={}, description="quadratic forms: {6: q6**2 + 2*q5*q6}")
     when: str | None = Field(
         default=None, description="direction of motion: positive or negative", json_schema_extra={"enum": [*DIRECTIONS, None]}
@@ -95,18 +97,18 @@ class ElementTable(_Table):
 class DrivesTable(_Table):
     """qm = ratio (q - offset), tau = ratio' (torque_constant * u)."""
 
-    ratio: list[list[Number]]
+    ratio: list[list[Number]] = Field(description="one row per motor: [[100, 0], [0, 80]]; rad per m for a prismatic joint")
     offset: list[Number] | None = Field(default=None, description="joint positions where the motors read 0; default 0")
-    torque_constant: list[Number] | Number = Field(default=1.0, description="a number, or one per motor")
+    torque_constant: list[Number] | Number = Field(default=1.0, description="N m/A; a number, or one per motor")
 
 
 class LimitsTable(_Table):
     """For exciting trajectories, one entry per actuated joint."""
 
     q: list[Interval] | None = Field(default=None, description="[lower, upper], or one number for +- that number")
-    qd: list[Number] | None = None
-    qdd: list[Number] | None = None
-    tau: list[Number] | None = None
+    qd: list[Number] | None = Field(default=None, description="largest speeds, rad/s or m/s")
+    qdd: list[Number] | None = Field(default=None, description="largest accelerations, rad/s^2 or m/s^2")
+    tau: list[Number] | None = Field(default=None, description="largest torques, N m or N")
 
 
 class RobotFile(_Table):
@@ -114,23 +116,29 @@ class RobotFile(_Table):
 
     symgen: int = Field(description="schema version")
     name: str = Field(description="identifier; names the emitted module")
-    title: str = ""
-    source: str = ""
+    title: str = Field(default="", description="one line, printed above results")
+    source: str = Field(default="", description="where the table comes from")
     gravity: list[Symbolic] = Field(description="acceleration of gravity in frame 0: [0, 0, -g]", min_length=3, max_length=3)
-    constants: dict[str, Number] = {}
+    constants: dict[str, Number] = Field(
+        default={}, description="lengths and angles by name, numbers only: {D2: 0.5, g: 9.81}; names stay in the formulas"
+    )
     convention: str = Field(
         default="proximal",
         description="proximal: Khalil and Kleinfinger; distal: classic DH, with its a as d and its d as r",
         json_schema_extra={"enum": list(CONVENTIONS)},
     )
     frames: dict[int, FrameRow] = Field(description="1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}")
-    loops: list[LoopRow] = []
+    loops: list[LoopRow] = Field(default=[], description="[{cut: 6, twin: 7}]")
     constraints: dict[str, Symbolic] = Field(default={}, description="passive joints: {q3: q5 - q2 + pi}")
     massless: list[int] = Field(default=[], description="links without inertial parameters")
-    elements: dict[str, ElementTable] = {}
-    drives: DrivesTable | None = None
-    limits: LimitsTable = Field(default_factory=LimitsTable)
-    values: dict[str, Number] = Field(default={}, description="standard parameters, SI; never used in the derivation")
+    elements: dict[str, ElementTable] = Field(default={}, description="FV: {kind: viscous, along: all} makes FV1, FV2 ...")
+    drives: DrivesTable | None = Field(default=None, description="motors to joints, for measured records")
+    limits: LimitsTable = Field(
+        default_factory=LimitsTable, description="for exciting trajectories; the sliders of the page take those of q"
+    )
+    values: dict[str, Number] = Field(
+        default={}, description="standard parameters you know, SI: {M1: 2.0, ZZ1: 0.17}; never used in the derivation"
+    )
 
 
 def json_schema() -> dict[str, Any]:

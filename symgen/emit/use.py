@@ -30,7 +30,9 @@ def use_script(robot: Robot, program: str, values: Mapping[str, float]) -> str:
         raise SymgenError(f"{robot.name}: joints {list(robot.passive)} are passive; a snippet needs a robot whose joints are all actuated")
     if missing := [name for name in robot.parameters if name not in values]:
         more = " ..." * (len(missing) > 12)
-        raise SymgenError(f"{robot.name}: no value of {', '.join(missing[:12])}{more}; add them under values, or give --estimate")
+        raise SymgenError(
+            f"{robot.name}: no value of {', '.join(missing[:12])}{more}; add them under values, 0 where one is zero, or give --estimate"
+        )
     n = len(robot.joints)
     matrices: dict[str, Matrix] = {kind: [[0.0] * n for _ in range(n)] for kind in LINEAR_KINDS}
     offset = [0.0] * n

@@ -121,6 +121,8 @@ def references_hold_every_verb_and_every_section(site: Path) -> None:
     for field in fields(Study):
         assert re.search(rf">{field.name}<", study), field.name
     assert "<!-- generated" not in commands + study
+    robot = (site / "reference" / "robot_file.html").read_text(encoding="utf-8")
+    assert "{6: q6**2 + 2*q5*q6}" in robot, "asterisks of a description are read as emphasis"
 
 
 def pages_in_a_browser_ask_for_files_of_the_site_alone(site: Path) -> None:
