@@ -172,8 +172,8 @@ def signs(found: Identification) -> Check:
     """Friction and motor inertia below zero: told without any extra, and by far the most frequent slip of a robot file or study."""
     remedy = "look at the sign of ratio, torque constant and columns of that joint, then at its coupling, units and frame; fit again"
     text = f"Below zero: {', '.join(found.negative)}" if found.negative else "None is certainly below zero"
-    question = "Have friction and motor inertia the sign they must have?"
-    return Check(question, "no" if found.negative else "good", text, f"above -{CERTAIN:g} deviations", remedy)
+    question = "Have friction and motor inertia the right sign?"
+    return Check(question, "no" if found.negative else "good", text, f"not below zero by {CERTAIN:g} deviations", remedy)
 
 
 def certain(found: Identification) -> Check:
