@@ -64,7 +64,10 @@ def column_names(settings: RecordSettings, first: Named, last: Named) -> Columns
     if isinstance(first, JointTable) and settings.units.t != "s":
         raise InputError(f"record.units.t is {settings.units.t}; time stamps of bags are read in s", file=first.file)
     of_q = _meant(first, "q", "position", given.q)
-    return Columns(t, of_q, _meant(last, "tau", "effort", given.tau or (given.q if isinstance(last, JointTable) else ())), qr)
+    of_tau = _meant(last, "tau", "effort", given.tau or (given.q if isinstance(last, JointTable) else ()))
+    if not {*of_q} <= {*first.names} and {*of_q} <= {*last.names} and {*of_tau} <= {*first.names}:
+        raise InputError(f"{first.file} holds the torques and {last.file} the positions; `files` are the positions, then the torques")
+    return Columns(t, of_q, of_tau, qr)
 
 
 def _meant(table: Named, key: str, quantity: str, names: Sequence[str]) -> tuple[str, ...]:

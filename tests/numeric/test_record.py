@@ -211,8 +211,13 @@ def test_two_files_are_the_two_halves_of_one_record(tmp_path):
     for name in ("a.csv", "b.csv"):
         write_csv(tmp_path / name)
     write_csv(tmp_path / "tau.csv", header="tau1,tau2", rows=TAU[:-3])
+    write_csv(tmp_path / "p.csv", header="a,b", rows=Q)
     for said, record in (
         (r"hold positions and torques each; .*also: \[b\.csv\]", {"files": ["a.csv", "b.csv"]}),
+        (
+            "holds the torques and p.csv the positions",
+            {"files": ["tau.csv", "p.csv"], "columns": {"q": ["a", "b"], "tau": ["tau1", "tau2"]}},
+        ),
         (r"60 samples of positions in a\.csv, 57 of torques in tau\.csv; cut", {"files": ["a.csv", "tau.csv"]}),
         (r"1 columns of positions \(q1\), 2 of torques \(tau1, tau2\)", {"files": "a.csv", "columns": {"q": "q1"}}),
     ):
@@ -356,7 +361,7 @@ def test_wrong_number_of_joints(tmp_path):
 def test_different_lengths(tmp_path):
     write_csv(tmp_path / "q.csv", header="q1,q2", rows=Q)
     write_csv(tmp_path / "tau.csv", header="tau1,tau2", rows=TAU[:-1])
-    with pytest.raises(InputError, match="60 samples of positions in q.csv, 59 of torques in tau.csv"):
+    with pytest.raises(InputError, match=r"60 samples of positions in q\.csv, 59 of torques in tau\.csv"):
         read_record(settings(files=["q.csv", "tau.csv"], rate=RATE), folder=tmp_path)
     np.savez(tmp_path / "a.npz", q1=Q[:, 0], q2=Q[1:, 1], tau1=T, tau2=T)
     with pytest.raises(InputError, match="different lengths: q1 60, q2 59"):
