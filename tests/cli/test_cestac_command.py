@@ -68,7 +68,7 @@ def test_bad_options(emps_data, options, words):
 def test_advice(emps_data, tmp_path):
     result = run("emps", "emps", "--advise", "--runs", 4, "-o", tmp_path)
     assert result.exit_code == 0, result.output
-    assert "least squares changes by less than 1 % up to Delta = 4.59e-06 m (M1R first; 4 runs there gave" in result.stdout
+    assert "least squares changes by less than 1 % up to Delta = 4.59e-06 m at the joints (M1R first; 4 runs there gave" in result.stdout
     assert {p.name for p in tmp_path.iterdir()} == {"report.html", "advice.json", "study.yaml", "advice.png", "advice.svg"}
     assert "Resolution advice" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
