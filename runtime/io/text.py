@@ -20,7 +20,7 @@ Array = np.ndarray
 
 LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits each
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
-MOST = 10_000_000  # lines held at once, some 80 bytes each beside their text
+MOST = 5_000_000  # lines held at once, some 80 bytes each beside their text
 
 
 @dataclass(frozen=True, eq=False)

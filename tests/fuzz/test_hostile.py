@@ -160,9 +160,9 @@ def test_members_that_overlap_and_names_that_climb(reader, tmp_path):
 
 
 def test_gzip_bombs(reader):
+    refused(reader, "csv.gz", gzip.compress(b"1," * 150_000_000, 1), "unpacks to")
     for unit in (b"\n", b"1,", b"12\n", b"\x00"):
-        refused(reader, "csv.gz", gzip.compress(unit * (300_000_000 // len(unit)), 9), "unpacks to")
-        refused(reader, "csv.gz", gzip.compress(unit * (60_000_000 // len(unit)), 9), "case.csv.gz")
+        refused(reader, "csv.gz", gzip.compress(unit * (30_000_000 // len(unit)), 1), "case.csv.gz")
 
 
 def test_lines_without_end(reader):
@@ -170,7 +170,7 @@ def test_lines_without_end(reader):
     refused(reader, "csv", b"," * 10_000_000, "a line of more than")
     refused(reader, "csv", b"," * 900_000, "columns; at most")
     refused(reader, "csv", csv_file() + b"," * 10_000_000, "a line of more than")
-    refused(reader, "csv", b"\n" * 20_000_000, "lines; read them by blocks")
+    refused(reader, "csv", b"\n" * 8_000_000, "lines; read them by blocks")
 
 
 def test_parquet_bombs(reader, tmp_path):
