@@ -34,4 +34,6 @@ def new(file: Annotated[Path, typer.Argument(help="Robot file to create, e.g. my
         if file.exists():
             fail(f"{file} exists already; choose another name or edit it")
         write_all(file.parent, {file.name: text})
-        typer.echo(f"{file}: edit it, then\n  symgen show {file}\n  symgen generate {file} -o generated")
+        typer.echo(
+            f"{file}: edit it, then\n  symgen show {file} --html     # look at it\n  symgen check {file}\n  symgen generate {file} -o models"
+        )

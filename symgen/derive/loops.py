@@ -169,6 +169,7 @@ def find_relations(robot: Robot) -> Found:
             raise DescriptionError(
                 f"passive joint {j} has no relation: it is in no loop; declare q{j} under constraints or set mu: 1",
                 path=("frames", j, "mu"),
+                file=robot.file or None,
             )
     rng = np.random.default_rng(3)
     general: dict[int, float] | None = None
@@ -237,11 +238,16 @@ def _check_mobility(robot: Robot, equations: LoopEquations, q: Mapping[int, floa
 
 def _wrong_mobility(robot: Robot, freedoms: int, left: int) -> DescriptionError:
     expected = len(robot.joints)
-    what = "over-constrained or has too many actuators" if freedoms < expected else "under-constrained or lacks actuators or relations"
+    what = (
+        "over-constrained or has too many actuators; joints without a motor have mu: 0"
+        if freedoms < expected
+        else "under-constrained or lacks actuators (mu: 1) or relations"
+    )
     return DescriptionError(
         f"mobility is {freedoms}, but {expected} joints are actuated ({list(robot.joints)})"
         f"{f'; with them held, {left} freedoms are left' if left else ''}; the mechanism is {what}",
         path=("loops",),
+        file=robot.file or None,
     )
 
 
@@ -340,6 +346,7 @@ def _cannot_close(robot: Robot, equations: LoopEquations) -> DescriptionError:
         f"frame {loop.cut} (cut) and frame {loop.twin} (twin) cannot coincide{also}; they come as close as {gap:.3g} (positions per longest link); "
         "check the lengths, alpha, theta and the row of the twin",
         path=("loops", robot.loops.index(loop)),
+        file=robot.file or None,
     )
 
 

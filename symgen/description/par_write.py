@@ -66,7 +66,9 @@ def write_par(robot: Robot) -> tuple[str, tuple[str, ...]]:
 def _check(robot: Robot, NL: int, NJ: int) -> None:
     if robot.constraints:
         relations = ", ".join(f"q{j} = {e}" for j, e in robot.constraints.items())
-        raise DescriptionError(f"{robot.name}: a .par file has no place for {relations}; without it the mechanism would be another")
+        raise DescriptionError(
+            f"{robot.name}: a .par file has no place for {relations}; without it the mechanism would be another; a loop with a cut joint and its twin has a place"
+        )
     if [(loop.cut, loop.twin) for loop in robot.loops] != [(k, k + NJ - NL) for k in range(NL + 1, NJ + 1)]:
         raise DescriptionError(
             f"{robot.name}: cut joints and twins are {[(loop.cut, loop.twin) for loop in robot.loops]}; a .par file numbers links first, then the "

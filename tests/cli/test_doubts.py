@@ -51,6 +51,22 @@ def test_decimals_for_round_angles_are_told(tmp_path, angle, meant):
         assert result.stderr.startswith("note: frame 1: alpha has") and f", not {meant}: another robot" in result.stderr
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("2: {ant: 1, sigma: 0, mu: 0,", "2: {ant: 1, sigma: 0,", ["2 joints are actuated ([1, 2])", "joints without a motor have mu: 0"]),
+        ("1: {ant: 0, sigma: 0,        alpha: 0", "1: {ant: 0, sigma: 0, alpha: pi/2", ["cannot coincide", "check the lengths, alpha"]),
+        ("loops:", "  6: {ant: 2, sigma: 0, mu: 0, alpha: 0, d: 0, theta: q6, r: 0}\nloops:", ["joint 6 has no relation", "declare q6"]),
+    ],
+)
+def test_a_loop_that_does_not_close_is_told_with_its_file(tmp_path, old, new, words):
+    assert TWO_BARS.count(old) == 1
+    (tmp_path / "bars.yaml").write_text(TWO_BARS.replace(old, new).replace("d: L3", "d: L1").replace("d: L4", "d: L2"))
+    result = CliRunner().invoke(app, ["show", str(tmp_path / "bars.yaml")])
+    assert result.exit_code == 2 and result.stderr.endswith("(bars.yaml)\n"), result.stderr
+    assert all(word in result.stderr for word in words), result.stderr
+
+
 def test_show_prints_the_passive_joints():
     lines = CliRunner().invoke(app, ["show", "sr400"]).stdout.splitlines()
     relations = [line for line in lines if line.startswith("passive: ")]
