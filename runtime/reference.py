@@ -28,7 +28,7 @@ MARGIN = 0.9  # of the limits of speed and acceleration, for random points
 REACH = 0.35  # of the range of a joint, to each side of its middle
 RAMP = 1 / 3  # of each piece: acceleration, constant velocity, deceleration
 RATE_TOLERANCE = 1e-3
-LONGEST = 20_000_000  # ticks
+LONGEST = 4_000_000  # ticks, an hour at 1 kHz; six joints and their speeds and accelerations take some 600 MB
 UNITS = {"q": "", "qd": "/s", "qdd": "/s^2"}
 
 

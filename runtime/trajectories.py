@@ -24,6 +24,7 @@ from runtime.mapping import structure
 
 MOST = 1000  # harmonics, terms or points of one part: far more than a motion of a robot has, few enough for any memory
 MOST_PARTS = 100  # of a chain
+BLOCK = 2**22  # times at once, by coefficients: a family holds a row of them for each time
 
 Array = np.ndarray
 States = tuple[Any, Any, Any]  # q, qd, qdd
@@ -253,8 +254,12 @@ class Motion:
         for k, part in enumerate(self.parts):
             stop = start + part.family.duration
             inside = (t >= start if k else t >= -np.inf) & (t < stop if k < len(self.parts) - 1 else t <= np.inf)
-            for j in range(self.n):
-                q[inside, j], qd[inside, j], qdd[inside, j] = part.family.joint(t[inside] - start, part.p[:, j], np)
+            rows = np.flatnonzero(inside)
+            size = max(BLOCK // len(part.p), 1)
+            for a in range(0, len(rows), size):
+                block = rows[a : a + size]
+                for j in range(self.n):
+                    q[block, j], qd[block, j], qdd[block, j] = part.family.joint(t[block] - start, part.p[:, j], np)
             start = stop
         return q, qd, qdd
 
