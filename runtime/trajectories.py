@@ -258,8 +258,9 @@ class Motion:
             size = max(BLOCK // len(part.p), 1)
             for a in range(0, len(rows), size):
                 block = rows[a : a + size]
-                for j in range(self.n):
-                    q[block, j], qd[block, j], qdd[block, j] = part.family.joint(t[block] - start, part.p[:, j], np)
+                with np.errstate(over="ignore", invalid="ignore"):  # who uses the motion asks for finite ones
+                    for j in range(self.n):
+                        q[block, j], qd[block, j], qdd[block, j] = part.family.joint(t[block] - start, part.p[:, j], np)
             start = stop
         return q, qd, qdd
 
