@@ -365,7 +365,7 @@ def _between(rng: np.random.Generator, lower: float, upper: float) -> float:
 
 def _positive(family: str, **values: float) -> None:
     for name, value in values.items():
-        if not (np.isfinite(value) and value > 0):
+        if not 0 < value < np.inf:  # an integer may be beyond every double
             raise SettingsError(f"{family}: {value}; expected more than 0", path=(name,))
         if isinstance(value, int) and value > MOST:
             raise SettingsError(f"{family}: {value}; at most {MOST} in one part", path=(name,))
