@@ -88,7 +88,12 @@ def heading(definition: str) -> str:
 def section(title: str, schema: Mapping[str, Any]) -> str:
     needed = schema.get("required", [])
     rows = [
-        (f"`{key}`", kind(value), "required" if key in needed else code(value.get("default", None)), value.get("description", "").replace("*", "\\*"))
+        (
+            f"`{key}`",
+            kind(value),
+            "required" if key in needed else code(value.get("default", None)),
+            value.get("description", "").replace("*", "\\*"),
+        )
         for key, value in schema["properties"].items()
     ]
     return f"## {title}\n\n{schema.get('description', '')}\n\n" + table(("key", "holds", "default", ""), rows)

@@ -41,7 +41,9 @@ def write_urdf(robot: Robot, values: Mapping[str, float] | None = None) -> tuple
             f"{robot.name}: a URDF is a tree; this robot has {len(robot.loops)} closed loop{'s' * (len(robot.loops) > 1)}"
         )
     if missing := [name for j in robot.links for p in INERTIAL if (name := parameter(p, j)) not in values]:
-        raise DescriptionError(f"{robot.name}: no value of {', '.join(missing[:12])}{' ...' * (len(missing) > 12)}; add them under values, 0 where one is zero")
+        raise DescriptionError(
+            f"{robot.name}: no value of {', '.join(missing[:12])}{' ...' * (len(missing) > 12)}; add them under values, 0 where one is zero"
+        )
     lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(robot.name)}>", '  <link name="link0"/>']
     for f in robot.frames:
         lines += _link(robot, f.j, values) + _joint(robot, f, values)
