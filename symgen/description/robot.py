@@ -232,7 +232,8 @@ def check_identifier(name: str, path: Path) -> None:
             if keyword.iskeyword(name)
             else "is no identifier; use a letter followed by letters, digits or _ (at most 40)"
         )
-        raise DescriptionError(f"{'.'.join(str(key) for key in path)}: {name!r} {what}", path=path)
+        where = ".".join(str(key) for key in path[:-1] or path)
+        raise DescriptionError(f"{where}: {name!r} {what}", path=path)
 
 
 def _check_text(text: str, name: str) -> None:
