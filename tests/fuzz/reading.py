@@ -170,7 +170,7 @@ def read_faulty(path: Path) -> object:
         case "death":
             os.kill(os.getpid(), signal.SIGSEGV)
         case "memory":
-            return [bytearray(2**26) for _ in range(100)]
+            return bytearray(2**33)
         case "traceback":
             return {}["x"]
         case "unclear":

@@ -43,7 +43,7 @@ def test_a_case_is_told_by_its_number():
 
 def test_the_harness_finds_faults():
     """A hang, an interpreter that ends, memory, a traceback and an unclear message are each seen."""
-    reader = Reader(seconds=0.5)
+    reader = Reader(seconds=1.0)
     assert reader("faulty", b"ok").kind == "ok"
     kinds = {kind: reader("faulty", kind.encode()).kind for kind in ("memory", "traceback", "unclear", "control", "hang", "death")}
     reader.close()
