@@ -245,9 +245,11 @@ BOMBS = {
 
 
 CODE = """
-import json, resource, sys, time
+import json, sys, time
 from runtime.errors import ModelError
 from runtime.model_shape import check_source
+def peak():  # kB; getrusage would tell that of the process that started this one
+    return next(int(line.split()[1]) for line in open('/proc/self/status') if line.startswith('VmHWM'))
 for name, text in json.load(sys.stdin).items():
     start = time.process_time()
     try:
@@ -255,7 +257,7 @@ for name, text in json.load(sys.stdin).items():
     except ModelError:
         print(name)
     assert time.process_time() - start < 5, name
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 1_000_000, name
+    assert peak() < 1_000_000, name
 """
 
 
