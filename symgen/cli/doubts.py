@@ -12,7 +12,6 @@ import typer
 if TYPE_CHECKING:
     from symgen.description import Robot
 
-ROUND = math.pi / 12  # angles that drawings have
 CLOSE = 1e-3  # rad: nearer to a round angle than a drawing shows, and not on it
 
 
@@ -24,15 +23,15 @@ def tell_doubts(robot: Robot) -> None:
 
 def nearly_round(robot: Robot) -> list[str]:
     """Angles written as decimals, such as 1.5708: exact arithmetic takes them for oblique ones, with formulas and base parameters of their own."""
-    from symgen.description.expression import PI
+    from symgen.description.expression import PI, twelfths
 
     found = []
     for f in robot.frames:
         for name, angle in (("gamma", f.gamma), ("alpha", f.alpha), ("theta", f.theta0)):
             if not (value := angle.constant):
                 continue
-            k = round(float(value) / ROUND)
-            if abs(float(value) - k * ROUND) < CLOSE:
+            k = twelfths(float(value), CLOSE)
+            if k is not None:
                 meant = PI * Fraction(k, 12)
                 found.append(
                     f"frame {f.j}: {name} has {angle}, not {meant}: "

@@ -9,6 +9,7 @@ so that two equal forms are equal objects; decimals are exact (0.225 = 9/40) and
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -174,7 +175,6 @@ class Expression:
 
     def value(self, values: Mapping[str, float]) -> float:
         """The number this expression has where `values` gives its symbols. Raises KeyError naming a missing one."""
-        import math
 
         def function(name: str, argument: Expression) -> float:
             x = argument.value(values)
@@ -290,12 +290,16 @@ def quarter_turns(angle: Expression) -> tuple[int, Expression]:
     return k, angle - PI * Fraction(k, 2)
 
 
+def twelfths(angle: float, within: float) -> int | None:
+    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle; None where none does. Drawings have such angles."""
+    k = round(angle * 12 / math.pi)
+    return k if abs(angle - k * math.pi / 12) <= within else None
+
+
 def _leading(e: Expression) -> Fraction:
     return e.terms[min(e.terms, key=_order)]
 
 
 def _isqrt(n: int) -> int | None:
-    from math import isqrt
-
-    r = isqrt(n)
+    r = math.isqrt(n)
     return r if r * r == n else None

@@ -14,13 +14,12 @@ W. Khalil, D. Creusot, SYMORO+: a system for the symbolic modelling of robots, R
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from symgen.description.expression import ONE, PI, Expression
+from symgen.description.expression import ONE, PI, Expression, twelfths
 from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Loop, Path, Robot, parameter
 from symgen.errors import DescriptionError, ExpressionError
@@ -271,10 +270,10 @@ def _near_quarter(e: Expression, what: str, par: _Par) -> Expression:
     c = e.terms.get(())
     if c is None or len(e.terms) > 2:
         return e
-    turn = round(float(c) * 12 / math.pi)
-    if not turn or abs(float(c) - turn * math.pi / 12) > NEARLY:
+    k = twelfths(float(c), NEARLY)
+    if not k:
         return e
-    exact = PI * Fraction(turn, 12)
+    exact = PI * Fraction(k, 12)
     par.notes.append(f"{what}: {float(c)!r} read as {exact}")
     return e - c + exact
 

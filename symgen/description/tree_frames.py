@@ -18,7 +18,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from symgen.description.expression import PI, ZERO, Expression
+from symgen.description.expression import PI, ZERO, Expression, twelfths
 from symgen.description.robot import FIXED, PRISMATIC, REVOLUTE, Frame
 from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree, turn
 
@@ -160,10 +160,8 @@ def _numbered(row: Sequence[float]) -> tuple[float, ...]:
 
 
 def _angle(x: float) -> tuple[float, Expression]:
-    turns = round(x * 12 / math.pi)
-    if abs(x - turns * math.pi / 12) <= SAME:
-        return turns * math.pi / 12, PI * Fraction(turns, 12)
-    return round(x, DIGITS), _exact(round(x, DIGITS))
+    k = twelfths(x, SAME)
+    return (round(x, DIGITS), _exact(round(x, DIGITS))) if k is None else (k * math.pi / 12, PI * Fraction(k, 12))
 
 
 def _exact(x: float) -> Expression:

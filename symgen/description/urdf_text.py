@@ -11,6 +11,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from symgen.description.expression import twelfths
 from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, MOVING, Inertial, Joint, Relation, Tree, turn
 from symgen.description.xml_text import LARGEST, MAX_BYTES, Array, Element, read_elements
 from symgen.errors import DescriptionError
@@ -77,9 +78,8 @@ def _pose(e: Element | None, nearly: float) -> Array:
 
 def snapped(angle: float, nearly: float) -> float:
     """`angle`, or the multiple of pi/12 within `nearly` of it."""
-    step = math.pi / 12
-    nearest = round(angle / step) * step
-    return nearest if abs(angle - nearest) <= nearly else angle
+    k = twelfths(angle, nearly)
+    return angle if k is None else k * (math.pi / 12)
 
 
 def _inertial(link: Element, nearly: float) -> Inertial | None:
