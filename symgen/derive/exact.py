@@ -5,6 +5,12 @@ the unit circle. The points form a group of order p + 1; p is chosen so that thi
 denominator of the robot's angles in units of pi: pi/3 or pi/4 are then exact roots of unity of F_p, not approximations.
 A fixed angle that is no multiple of pi is transcendental, hence a random point; its rational multiples are powers of that point.
 
+Square roots of rationals lie in the same cyclotomic field and are taken from the same root of unity, so that sqrt(3)/2 is cos(pi/6) and
+never -cos(pi/6). For an odd prime l, by Gauss, with the Legendre symbol (k/l) (Ireland and Rosen, A Classical Introduction to Modern Number
+Theory, 6.4):
+
+    sqrt(l) = sum_k (k/l) cos(2 pi k/l)  if l = 1 (mod 4),      sum_k (k/l) sin(2 pi k/l)  if l = 3 (mod 4),      sqrt(2) = 2 cos(pi/4).
+
 Directions of motion: sign(sd) = 2b - 1 with a random field value b for each class of proportional rows G; max(sd, 0) = b sd. Everything is
 linear in b, so a generic b proves what bits would.
 """
@@ -14,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from functools import lru_cache
-from math import lcm
+from math import isqrt, lcm, prod
 
 import numpy as np
 
@@ -24,6 +30,7 @@ from symgen.description.robot import Robot
 
 Array = np.ndarray
 PI: Monomial = (("pi", 1),)
+LARGEST_RADICAND = 100  # roots of larger primes are drawn by themselves: their fields share nothing with angles of small denominator
 
 
 class Fp:
@@ -81,8 +88,10 @@ def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
 
 
 def angle_denominators(robot: Robot) -> dict[Monomial, int]:
-    """{monomial: D}: every fixed angle is a sum of whole multiples of monomial/D."""
+    """{monomial: D}: every fixed angle is a sum of whole multiples of monomial/D; the square roots need 2 pi/l and pi/4."""
     D: dict[Monomial, int] = {PI: 2}
+    for l in radicands(robot):
+        D[PI] = lcm(D[PI], 4 if l == 2 else l)
     for e in fixed_angles(robot):
         for m, c in e.terms.items():
             D[m] = lcm(D.get(m, 1), c.denominator)
@@ -95,10 +104,38 @@ def _angles(robot: Robot) -> Iterator[Expression]:
     joints = {f"q{i}": Expression() for i in robot.moving}
     for e in robot.constraints.values():
         yield e.substitute(joints)
+    yield from (a.argument for a in _calls(robot) if a.function in ("cos", "sin"))
+
+
+def _calls(robot: Robot) -> Iterator[Call]:
+    """Functions in lengths, gravity and the rows of elements."""
     lengths = [e for f in robot.frames for e in (f.b, f.d, f.r0)]
     rows = [c for e in robot.elements for table in (e.along, e.form) for row in table.values() for c in row.values()]
-    for e in (*robot.gravity, *lengths, *rows):
-        yield from (a.argument for a in e.atoms if isinstance(a, Call) and a.function in ("cos", "sin"))
+    pending = [*robot.gravity, *lengths, *rows]
+    while pending:
+        for a in pending.pop().atoms:
+            if isinstance(a, Call):
+                yield a
+                pending.append(a.argument)
+
+
+def radicands(robot: Robot) -> tuple[int, ...]:
+    """The primes below LARGEST_RADICAND under square roots of rational numbers."""
+    arguments = {a.argument.constant for a in _calls(robot) if a.function == "sqrt"}
+    found = {l for c in arguments if c is not None for l in prime_factors(c.numerator * c.denominator)[0]}
+    return tuple(sorted(found))
+
+
+def prime_factors(n: int) -> tuple[tuple[int, ...], int]:
+    """The primes below LARGEST_RADICAND that divide n to an odd power, and the part of n that is free of such primes."""
+    odd: list[int] = []
+    for l in range(2, LARGEST_RADICAND):
+        times = 0
+        while n % l == 0:
+            n, times = n // l, times + 1
+        if times % 2:
+            odd.append(l)
+    return tuple(odd), n
 
 
 @lru_cache
@@ -163,6 +200,7 @@ class Draw:
         for _ in range(200):
             self._constants = {name: self._geometry[name] if name in self._geometry else self._random(1) for name in robot.constants}
             self._angles: dict[Monomial, Point] = {}
+            self._root: Point | None = None
             if self._roots_exist():
                 break
         self._rate: dict[tuple[int, int], Array] = {}
@@ -207,8 +245,43 @@ class Draw:
             if m in self._geometry:
                 self._angles[m] = self._point_at(self._geometry[m])
             else:
-                self._angles[m] = self._root_of_unity(2 * self.denominators[m]) if m == PI else self._circle(1)
+                self._angles[m] = self._half_turn() if m == PI else self._circle(1)
         return self._angles[m]
+
+    def _half_turn(self) -> Point:
+        """The point of the angle pi/D, a root of unity of order 2D."""
+        if self._root is None:
+            self._root = self._root_of_unity(2 * self.denominators[PI])
+        return self._root
+
+    def _sqrt_of_prime(self, l: int) -> Array:
+        """sqrt(l) as a sum of cosines or sines, see the head of this module."""
+        D = self.denominators[PI]
+        if l == 2:
+            return 2 * self._multiple(self._half_turn(), D // 4)[0] % self.p
+        turn = self._multiple(self._half_turn(), 2 * D // l)
+        total = np.zeros(1, dtype=np.int64)
+        for k in range(1, l):
+            legendre = 1 if pow(k, (l - 1) // 2, l) == 1 else -1
+            total = (total + legendre * self._multiple(turn, k)[l % 4 == 3]) % self.p
+        return total
+
+    def _sqrt(self, x: Fp) -> Fp:
+        root = power(x.x, (self.p + 1) // 4, self.p)
+        if (root * root % self.p != x.x).any():
+            raise ArithmeticError("no square root in this draw")
+        return self._fp(root)
+
+    def _sqrt_of_rational(self, c: Fraction) -> Fp:
+        """sqrt(m/n) = sqrt(m n)/n; m n is a square times distinct primes."""
+        product = c.numerator * c.denominator
+        primes, rest = prime_factors(product)
+        square = isqrt(product // rest // prod(primes))
+        root = self._number(Fraction(square, c.denominator))
+        root = root * (self._number(Fraction(isqrt(rest))) if isqrt(rest) ** 2 == rest else self._sqrt(self._number(Fraction(rest))))
+        for l in primes:
+            root = root * self._fp(self._sqrt_of_prime(l))
+        return root
 
     def _root_of_unity(self, order: int) -> Point:
         """A point of that order, a multiple of 4, a quarter of which is (0, 1)."""
@@ -250,14 +323,14 @@ class Draw:
     def _call(self, function: str, argument: Expression) -> Fp:
         if function in ("cos", "sin"):
             return self._fp(self._angle(argument)[function == "sin"])
+        c = argument.constant
+        if function == "sqrt" and c is not None:
+            return self._sqrt_of_rational(c)
         x = self.constant(argument)
         value = x if isinstance(x, Fp) else self._number(Fraction(x))
         if function == "inv":
             return self._fp(power(value.x, self.p - 2, self.p))
-        root = power(value.x, (self.p + 1) // 4, self.p)
-        if (root * root % self.p != value.x).any():
-            raise ArithmeticError("no square root in this draw")
-        return self._fp(root)
+        return self._sqrt(value)
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
         if not turn:

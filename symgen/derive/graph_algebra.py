@@ -16,7 +16,7 @@ ActiveRow = tuple[tuple[int, Expression], ...]
 class GraphAlgebra:
     """Scalars are nodes of one graph: inputs q1, QP1, QDP1 ... and the constants of the robot file under their names.
 
-    `sections` are (index of the first node, title); `angles` remembers what angle a cos or sin node is of.
+    `sections` are (index of the first node, title); `angles` holds the angle of every cos and sin node, `roots` every square root.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -24,6 +24,7 @@ class GraphAlgebra:
         self.named = Names(len(robot.frames))
         self.sections: list[tuple[int, str]] = []
         self.angles: dict[int, tuple[Turn, Expression]] = {}
+        self.roots: dict[int, Expression] = {}
         self._labels: dict[str, tuple[Turn, Expression]] = {}
 
     def section(self, title: str) -> None:
@@ -41,7 +42,11 @@ class GraphAlgebra:
             value = self.graph.cos(x) if function == "cos" else self.graph.sin(x)
             self.angles[value.node.index] = ((), argument if value.sign > 0 or function == "cos" else -argument)
             return value
-        return self.graph.sqrt(x) if function == "sqrt" else self.graph.inverse(x)
+        if function == "inv":
+            return self.graph.inverse(x)
+        root = self.graph.sqrt(x)
+        self.roots[root.node.index] = call("sqrt", argument)
+        return root
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
         if not turn:

@@ -117,7 +117,7 @@ class Program:
                 point = self.draw.cos_sin(turn, offset)[node.op == "sin"]
                 return point.x if isinstance(point, Fp) else np.array([point % p])
             case "sqrt":
-                return power(self._operand(node.operands[0]), (p + 1) // 4, p)
+                return np.asarray(self.draw.constant(self.algebra.roots[source.index]).x)
             case "inv":
                 return power(self._operand(node.operands[0]), p - 2, p)
         return self._directed(node)
