@@ -24,19 +24,19 @@ single_thread()
 import numpy as np  # noqa: E402  (numpy reads the number of threads when it loads)
 from scipy.special import stdtrit  # noqa: E402
 
-from runtime.advice import crossing  # noqa: E402
-from runtime.cestac import cestac  # noqa: E402
-from runtime.essential import essential  # noqa: E402
 from runtime.estimators import linear_system  # noqa: E402
+from runtime.estimators.essential import essential  # noqa: E402
 from runtime.estimators.linear import assemble  # noqa: E402
-from runtime.io.datasets import dataset_study  # noqa: E402
-from runtime.io.records import read_records  # noqa: E402
-from runtime.observation import observe  # noqa: E402
-from runtime.perturbation import perturbation  # noqa: E402
-from runtime.resolution import LIMITS, advise  # noqa: E402
-from runtime.sampler import Sampler  # noqa: E402
-from runtime.study import study_from_mapping  # noqa: E402
-from symgen.cli.haptic_record import haptic_record, haptic_study  # noqa: E402
+from runtime.observation.observation import observe  # noqa: E402
+from runtime.observation.position_errors import perturbation  # noqa: E402
+from runtime.records.datasets import dataset_study  # noqa: E402
+from runtime.records.reading import read_records  # noqa: E402
+from runtime.resolution.advice import crossing  # noqa: E402
+from runtime.resolution.advisor import LIMITS, advise  # noqa: E402
+from runtime.resolution.cestac import cestac  # noqa: E402
+from runtime.resolution.sampler import Sampler  # noqa: E402
+from runtime.settings.study import study_from_mapping  # noqa: E402
+from symgen.demo.haptic_record import haptic_record, haptic_study  # noqa: E402
 
 RUNS = {"emps": 100, "tx40": 60, "haptic": 30}
 LEVELS = 8

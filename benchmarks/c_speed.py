@@ -23,8 +23,8 @@ import numpy as np
 from rounds import interleave, processor, ratio
 
 from runtime import GeneratedModel, load_model
-from runtime.studies.compile_cache import FallbackWarning, compiler
-from runtime.studies.compiled import compiled_model
+from runtime.model.compile_cache import FallbackWarning, compiler
+from runtime.model.compiled import compiled_model
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

@@ -32,10 +32,10 @@ import numpy as np
 from c_speed import processor
 
 from runtime import GeneratedModel, Record, Study, load_model, observe, read_records, study_from_mapping
-from runtime.cestac import Cestac, cestac
-from runtime.essential import essential
-from runtime.io.datasets import dataset_study
-from runtime.studies.compiled import compiled_model
+from runtime.estimators.essential import essential
+from runtime.model.compiled import compiled_model
+from runtime.records.datasets import dataset_study
+from runtime.resolution.cestac import Cestac, cestac
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

@@ -30,12 +30,12 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 
-from runtime.array_model import ArrayModel, load_arrays
-from runtime.cestac import cestac
-from runtime.model import GeneratedModel, load_model
-from runtime.record import Record
-from runtime.studies.device import Device, arrays_like, to_host
-from runtime.study import CestacSettings, Study
+from runtime.model.array_model import ArrayModel, load_arrays
+from runtime.model.generated import GeneratedModel, load_model
+from runtime.records.record import Record
+from runtime.resolution.cestac import cestac
+from runtime.resolution.device import Device, arrays_like, to_host
+from runtime.settings.study import CestacSettings, Study
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

@@ -31,18 +31,18 @@ from matplotlib.ticker import NullFormatter
 from simulation import LAW
 
 from runtime import InputError, load_model, read_records, study_from_mapping
-from runtime.closed_loop import ClosedLoop, closed_loop
-from runtime.estimate import Estimate, aligned
 from runtime.estimators import estimate
-from runtime.io.datasets import dataset_study
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.perturbation import with_errors
-from runtime.processes import results
-from runtime.record import Record
-from runtime.reference import Reference, reference_of
-from runtime.studies.simulation import Simulator, parameters_of
-from runtime.study import EstimateSettings, Study
+from runtime.estimators.closed_loop import ClosedLoop, closed_loop
+from runtime.estimators.estimate import Estimate, aligned
+from runtime.model.generated import GeneratedModel
+from runtime.motion.reference import Reference, reference_of
+from runtime.motion.simulation import Simulator, parameters_of
+from runtime.observation.observation import Observation
+from runtime.observation.position_errors import with_errors
+from runtime.parallel import results
+from runtime.records.datasets import dataset_study
+from runtime.records.record import Record
+from runtime.settings.study import EstimateSettings, Study
 
 Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"

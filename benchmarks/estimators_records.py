@@ -24,17 +24,17 @@ from scipy.io import loadmat
 from simulation import LAW
 
 from runtime import load_model, read_records, study_from_mapping
-from runtime.closed_loop import closed_loop
 from runtime.errors import InputError
-from runtime.estimate import Estimate, aligned
 from runtime.estimators import estimate
-from runtime.io.datasets import dataset_study, fetch
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.perturbation import with_errors
-from runtime.reference import Reference
-from runtime.studies.simulation import Simulator
-from runtime.study import EstimateSettings, Study
+from runtime.estimators.closed_loop import closed_loop
+from runtime.estimators.estimate import Estimate, aligned
+from runtime.model.generated import GeneratedModel
+from runtime.motion.reference import Reference
+from runtime.motion.simulation import Simulator
+from runtime.observation.observation import Observation
+from runtime.observation.position_errors import with_errors
+from runtime.records.datasets import dataset_study, fetch
+from runtime.settings.study import EstimateSettings, Study
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 ENCODER = {"emps": 1e-6, "tx40": 1e-5}  # deviation of a position that TLS is told, m and rad of the joint

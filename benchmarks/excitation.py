@@ -21,19 +21,19 @@ from ruamel.yaml import YAML
 from simulation import LAW
 
 from runtime import load_model
-from runtime.controller_settings import Controller
-from runtime.essential import essential
 from runtime.estimators import estimate
-from runtime.excitation import excesses, kept_correlation, limits_of, observed, usage, weights_of
-from runtime.excitation_settings import ExcitationSettings
-from runtime.io.records import read_records
-from runtime.io.study_files import study_of
-from runtime.mapping import structure
-from runtime.observation import observe
-from runtime.reference import Reference
-from runtime.signals import decimated, decimation_factor
-from runtime.studies.excitation import excite
-from runtime.studies.simulation import Simulator, parameters_of
+from runtime.estimators.essential import essential
+from runtime.excitation.criteria import excesses, kept_correlation, limits_of, observed, usage, weights_of
+from runtime.excitation.search import excite
+from runtime.motion.reference import Reference
+from runtime.motion.simulation import Simulator, parameters_of
+from runtime.observation.filters import decimated, decimation_factor
+from runtime.observation.observation import observe
+from runtime.records.reading import read_records
+from runtime.settings.controller import Controller
+from runtime.settings.excitation import ExcitationSettings
+from runtime.settings.files import study_of
+from runtime.settings.schema import structure
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 RATE = 5000.0

@@ -36,15 +36,15 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 
-from runtime.estimate import Estimate
 from runtime.estimators import estimate
-from runtime.io.datasets import dataset_study, fetch
-from runtime.io.files import read_bytes
-from runtime.io.records import read_records
-from runtime.model import GeneratedModel, load_model
-from runtime.observation import Observation, observe
-from runtime.studies.compiled import compiled_model
-from runtime.study import Decimate, Lowpass, Rows, Signals, Study, study_from_mapping
+from runtime.estimators.estimate import Estimate
+from runtime.files import read_bytes
+from runtime.model.compiled import compiled_model
+from runtime.model.generated import GeneratedModel, load_model
+from runtime.observation.observation import Observation, observe
+from runtime.records.datasets import dataset_study, fetch
+from runtime.records.reading import read_records
+from runtime.settings.study import Decimate, Lowpass, Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

@@ -29,14 +29,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from memory import BLOCK, identified, write_npz
 
-from runtime.cestac import cestac
-from runtime.columns import DecimatedSignals, distinct_entries
-from runtime.model import GeneratedModel, load_model
-from runtime.record import Record
-from runtime.signals import States, decimation_plan
-from runtime.studies.compile_cache import FallbackWarning
-from runtime.studies.compiled import compiled_model
-from runtime.study import CestacSettings, Decimate, Study
+from runtime.model.compile_cache import FallbackWarning
+from runtime.model.compiled import compiled_model
+from runtime.model.generated import GeneratedModel, load_model
+from runtime.observation.filters import States, decimation_plan
+from runtime.observation.regressor_signals import DecimatedSignals, distinct_entries
+from runtime.records.record import Record
+from runtime.resolution.cestac import cestac
+from runtime.settings.study import CestacSettings, Decimate, Study
 from symgen.description import load_robot, parse_robot
 from symgen.emit import generate_files, generate_module
 

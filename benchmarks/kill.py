@@ -37,7 +37,7 @@ from symgen.cli.writing import FINISHED, LOCK, UNFINISHED
 from symgen.emit import generate_module
 
 MAIN = "from symgen.cli.main import main; main()"
-OFTEN = "from runtime.checkpoint import Checkpoint; Checkpoint.__init__.__kwdefaults__['every'] = 0.02; " + MAIN
+OFTEN = "from runtime.resolution.checkpoint import Checkpoint; Checkpoint.__init__.__kwdefaults__['every'] = 0.02; " + MAIN
 ROBOT = "planar_2r"
 NOTE = "of the user"
 POLL = 1e-4  # s, between looks at a folder

@@ -39,8 +39,8 @@ import pinocchio as pin
 from oracles.pinocchio_model import PinocchioModel, placement
 from oracles.random_robots import random_state
 from runtime import GeneratedModel, load_model
-from runtime.studies.compile_cache import FallbackWarning, compiler
-from runtime.studies.compiled import compiled_model
+from runtime.model.compile_cache import FallbackWarning, compiler
+from runtime.model.compiled import compiled_model
 from symgen.description import load_robot
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.emit import generate_files

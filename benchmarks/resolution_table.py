@@ -12,12 +12,12 @@ from symgen.cli.session import opened_model, single_thread
 
 single_thread()
 
-from runtime.io.datasets import dataset_study  # noqa: E402  (numpy reads the number of threads when it loads)
-from runtime.io.records import read_records  # noqa: E402
-from runtime.study import study_from_mapping  # noqa: E402
-from symgen.cli.chapter_tables import TABLE_3  # noqa: E402
-from symgen.cli.demo_sections import KEY, TOLERANCE  # noqa: E402
-from symgen.cli.demonstration import demonstrate  # noqa: E402
+from runtime.records.datasets import dataset_study  # noqa: E402  (numpy reads the number of threads when it loads)
+from runtime.records.reading import read_records  # noqa: E402
+from runtime.settings.study import study_from_mapping  # noqa: E402
+from symgen.demo.chapter_tables import TABLE_3  # noqa: E402
+from symgen.demo.demonstration import demonstrate  # noqa: E402
+from symgen.demo.sections import KEY, TOLERANCE  # noqa: E402
 
 
 def main() -> None:

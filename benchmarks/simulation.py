@@ -25,11 +25,11 @@ import numpy as np
 from rounds import interleave, processor, ratio
 
 from runtime import load_model
-from runtime.controller_settings import Controller
-from runtime.mapping import structure
-from runtime.reference import reference_of
-from runtime.studies.compile_cache import FallbackWarning, compiler
-from runtime.studies.simulation import Simulator, parameters_of
+from runtime.model.compile_cache import FallbackWarning, compiler
+from runtime.motion.reference import reference_of
+from runtime.motion.simulation import Simulator, parameters_of
+from runtime.settings.controller import Controller
+from runtime.settings.schema import structure
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 LAW = {

@@ -5,8 +5,8 @@
 TX40, 60 columns, a trajectory of sinusoids with torque noise; every contender starts from q, qd, qdd, tau of shape (N, n).
 
     W, lstsq         observation_matrix of the emitted NumPy module on all samples into a used store, numpy.linalg.lstsq
-    NumPy NE, TSQR   `runtime.reductions`: normal equations and one refinement; structured triangular factor
-    C NE, TSQR       the same by `runtime.studies.fused_reductions`
+    NumPy NE, TSQR   `runtime.estimators.reductions`: normal equations and one refinement; structured triangular factor
+    C NE, TSQR       the same by `runtime.resolution.c.least_squares`
 
 One process pinned to one core, one BLAS thread, CPU time, contenders in rotated order in every round, ratios per round as median [range]. Goals at
 100000 samples: NumPy NE 20, C NE 30, C TSQR 10 times faster, with lstsq's digits up to cond(W) 1e6.
@@ -37,11 +37,11 @@ import scipy
 from c_speed import interleave, processor, ratio
 
 from runtime import GeneratedModel, load_model
+from runtime.estimators.reductions import normal_equations, triangular_factor
 from runtime.estimators.solution import solve
-from runtime.reductions import normal_equations, triangular_factor
-from runtime.studies import fused_reductions as in_c
-from runtime.studies.compile_cache import FallbackWarning, compiler
-from runtime.studies.compiled import CompiledModel, compiled_model
+from runtime.model.compile_cache import FallbackWarning, compiler
+from runtime.model.compiled import CompiledModel, compiled_model
+from runtime.resolution.c import least_squares as in_c
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

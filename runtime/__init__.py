@@ -1,7 +1,7 @@
 """From a measured record to parameters: numpy and scipy only.
 
     model = load_model("tx40")
-    study = load_study(path)                        # runtime.io.study_files
+    study = load_study(path)                        # runtime.settings.files
     record = read_records(study.record, model)[0]
     observation = observe(model, record, study)     # Y = W X + rho, eqs. (6) and (14)
 
@@ -12,18 +12,18 @@ Estimators take an Observation or a Reduction and return an Estimate (`runtime.e
 `normal_equations` and `triangular_factor` solve by blocks, without W.
 """
 
-from runtime.drives import Drives
 from runtime.errors import DataUnavailableError, InputError, ModelError, SettingsError
-from runtime.estimators.reduction import Reduction
-from runtime.io.records import read_record, read_records
-from runtime.io.streams import open_streams
-from runtime.model import GeneratedModel, load_model
-from runtime.observation import Observation, observe, stack
-from runtime.record import Record
-from runtime.reductions import normal_equations, triangular_factor
-from runtime.signals import States, filtered_states
-from runtime.streaming import reduce_records
-from runtime.study import Study, study_from_mapping, to_mapping
+from runtime.estimators.reductions import normal_equations, triangular_factor
+from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel, load_model
+from runtime.observation.by_blocks import reduce_records
+from runtime.observation.filters import States, filtered_states
+from runtime.observation.observation import Observation, observe, stack
+from runtime.observation.reduction import Reduction
+from runtime.records.reading import read_record, read_records
+from runtime.records.reading_by_blocks import open_streams
+from runtime.records.record import Record
+from runtime.settings.study import Study, study_from_mapping, to_mapping
 
 __all__ = [
     "DataUnavailableError",

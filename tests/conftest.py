@@ -13,7 +13,7 @@ import pytest
 from hypothesis import settings
 
 from runtime.errors import DataUnavailableError
-from runtime.io.datasets import DATASETS, fetch, locate
+from runtime.records.datasets import DATASETS, fetch, locate
 
 settings.register_profile("symgen", derandomize=True, deadline=None)
 settings.load_profile("symgen")

@@ -16,7 +16,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from typer.main import get_command
 
-from runtime.study import Study, to_mapping
+from runtime.settings.study import Study, to_mapping
 from symgen.cli.main import VERBS, app
 from symgen.description import load_robot, packaged_robots
 from symgen.description.schema import json_schema

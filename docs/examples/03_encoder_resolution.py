@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from runtime import Record, load_model, study_from_mapping
-from runtime.cestac import cestac
-from runtime.resolution import advise
+from runtime.resolution.advisor import advise
+from runtime.resolution.cestac import cestac
 from symgen import generate_module, load_robot
 
 module = Path(tempfile.mkdtemp()) / "planar_2r.py"

@@ -6,7 +6,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from runtime.symbolic_model import load_symbolic
+from runtime.model.casadi import load_symbolic
 from symgen import load_robot
 from symgen.emit import generate_files
 

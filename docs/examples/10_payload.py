@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime import Record, load_model, observe, study_from_mapping
-from runtime.payload import payload
+from runtime.identification.payload import payload
 from symgen import generate_module, load_robot
 
 module = Path(tempfile.mkdtemp()) / "planar_2r.py"

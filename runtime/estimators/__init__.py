@@ -17,13 +17,13 @@ from dataclasses import replace
 from typing import Any, Protocol, TypeVar
 
 from runtime.errors import SettingsError
-from runtime.estimate import Estimate
 from runtime.estimators import cloe, didim, feasible, irls, iv, ols, tls, wls
+from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import System, assemble
-from runtime.estimators.reduction import Reduction
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.study import EstimateSettings
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.observation.reduction import Reduction
+from runtime.settings.study import EstimateSettings
 
 T = TypeVar("T")
 

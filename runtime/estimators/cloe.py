@@ -18,17 +18,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.closed_loop import ClosedLoop, loop_of
 from runtime.errors import InputError, SettingsError
-from runtime.estimate import Estimate
 from runtime.estimators import iv, ols
-from runtime.estimators.correlated import block_covariance, block_of_rows, default_block
-from runtime.estimators.iteration import Array, columns_of, full, initial
+from runtime.estimators.block_covariance import block_covariance, block_of_rows, default_block
+from runtime.estimators.closed_loop import ClosedLoop, loop_of
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.fixed_point import Array, columns_of, full, initial
 from runtime.estimators.linear import assemble, outcome, standard_deviations
-from runtime.mapping import structure
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.study import EstimateSettings
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.settings.schema import structure
+from runtime.settings.study import EstimateSettings
 
 DAMPING = 1e-3  # of the diagonal of the scaled J'J, at the start
 RISE, FALL = 5.0, 0.3

@@ -15,14 +15,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from runtime.closed_loop import Run, loop_of
-from runtime.estimate import Estimate
 from runtime.estimators import wls
-from runtime.estimators.iteration import Array, Step, columns_of, iterate, options_of, told, trail_of
+from runtime.estimators.closed_loop import Run, loop_of
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.fixed_point import Array, Step, columns_of, iterate, options_of, told, trail_of
 from runtime.estimators.linear import System, assemble, standard_deviations
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.study import EstimateSettings
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.settings.study import EstimateSettings
 
 
 def didim(

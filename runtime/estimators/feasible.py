@@ -3,11 +3,11 @@
     min ||R (z - K chi)||^2 + weight D(chi)      subject to  P_j(chi) >= margin 1, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
 
-W is factored once and b rows enter the semidefinite program (`runtime.studies.consistency`); the conditions are those of `runtime.physical`. All base
+W is factored once and b rows enter the semidefinite program (`runtime.estimators.semidefinite`); the conditions are those of `runtime.estimators.physical`. All base
 parameters are fitted, essential or not: a condition ties every parameter of a link. With the columns of some parameters alone, the others
 are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls. Where least squares is feasible, it is the solution.
 
-options (all of `runtime.feasibility.Limits` too):
+options (all of `runtime.estimators.feasibility.Limits` too):
     margin     smallest eigenvalue of every condition, SI; 1e-6
     prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from the values of the robot file
     weight     of D, a number; "auto": the largest, to half a decade, that raises the residual norm by at most 1 %; "held-out": that by which
@@ -32,18 +32,18 @@ from typing import Any, Literal
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimate import Estimate
 from runtime.estimators import ols, wls
-from runtime.estimators.correlated import block_of_rows, default_block
+from runtime.estimators.block_covariance import block_of_rows, default_block
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
 from runtime.estimators.linear import System, assemble
-from runtime.estimators.triangular import Array, Factor, factor
-from runtime.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
-from runtime.mapping import structure
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.physical import PhysicalModel, physical_model
-from runtime.studies.consistency import Distance, Found, Rows, closest, everything
-from runtime.study import EstimateSettings
+from runtime.estimators.physical import PhysicalModel, physical_model
+from runtime.estimators.semidefinite import Distance, Found, Rows, closest, everything
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.observation.qr_factor import Array, Factor, factor
+from runtime.settings.schema import structure
+from runtime.settings.study import EstimateSettings
 
 INCREASE = 1.01  # of the residual norm that weight: auto allows
 WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)

@@ -23,16 +23,16 @@ from typing import Any, Literal
 import numpy as np
 
 from runtime.errors import SettingsError
-from runtime.estimate import Estimate
 from runtime.estimators import wls
-from runtime.estimators.correlated import block_covariance, block_of_rows, default_block
+from runtime.estimators.block_covariance import block_covariance, block_of_rows, default_block
+from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import System, assemble
 from runtime.estimators.solution import solve
-from runtime.estimators.triangular import Array, Factor, factor
-from runtime.mapping import structure
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.study import EstimateSettings
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.observation.qr_factor import Array, Factor, factor
+from runtime.settings.schema import structure
+from runtime.settings.study import EstimateSettings
 
 TUNING = {"huber": 1.345, "tukey": 4.685}
 NORMAL = 0.6745

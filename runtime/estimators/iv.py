@@ -24,16 +24,16 @@ from scipy.linalg import LinAlgError
 from scipy.sparse import csr_array
 from scipy.stats import chi2
 
-from runtime.closed_loop import Run, loop_of
 from runtime.errors import InputError
-from runtime.estimate import Estimate
 from runtime.estimators import ols, wls
-from runtime.estimators.correlated import block_of_rows, default_block
-from runtime.estimators.iteration import Array, Step, columns_of, iterate, options_of, told, trail_of
+from runtime.estimators.block_covariance import block_of_rows, default_block
+from runtime.estimators.closed_loop import Run, loop_of
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.fixed_point import Array, Step, columns_of, iterate, options_of, told, trail_of
 from runtime.estimators.linear import assemble, outcome
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.study import EstimateSettings
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.settings.study import EstimateSettings
 
 CONDITION = 1e4
 """Condition of Z'VW with unit columns above which the instruments are called weak."""
@@ -160,6 +160,6 @@ def _by_block(seen: Observation, Z: Array, residual: Array) -> Array:
 
 
 def _scale(seen: Observation, b: int) -> float:
-    """Correction of `runtime.estimators.correlated` for residuals that a fit has shrunk; nan where it has none."""
+    """Correction of `runtime.estimators.block_covariance` for residuals that a fit has shrunk; nan where it has none."""
     r, K = len(seen.Y), int(block_of_rows(seen, default_block(seen)).max()) + 1
     return K / (K - 1) * (r - 1) / (r - b) if K > 1 and r > b else float("nan")

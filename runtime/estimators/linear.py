@@ -1,7 +1,7 @@
 """From a factored linear system to an Estimate: eqs. (7)-(11), rank and residuals by joint, all from triangular factors.
 
 A System is the rows as a method weighs them. Ordinary least squares leaves them as they are; weighted least squares divides the rows of joint
-j by s_j. Removing columns from a System is cheap, which is what `runtime.essential` lives on; weights stay as they are while columns go.
+j by s_j. Removing columns from a System is cheap, which is what `runtime.estimators.essential` lives on; weights stay as they are while columns go.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import numpy as np
 import scipy
 
 from runtime.errors import SettingsError
-from runtime.estimate import Estimate, JointFit
-from runtime.estimators.correlated import block_covariance, block_of_rows, default_block, score_covariance
-from runtime.estimators.reduction import Reduction
+from runtime.estimators.block_covariance import block_covariance, block_of_rows, default_block, score_covariance
+from runtime.estimators.estimate import Estimate, JointFit
 from runtime.estimators.solution import Solution, solve
-from runtime.estimators.triangular import Array, Factor, factor
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.study import EstimateSettings, to_mapping
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.observation.qr_factor import Array, Factor, factor
+from runtime.observation.reduction import Reduction
+from runtime.settings.study import EstimateSettings, to_mapping
 
 OPTIONS = ("rank_tolerance", "block")
 """Options every linear method takes: smallest s_i/s_1 with unit columns that counts as rank; length of a block of residuals, s."""

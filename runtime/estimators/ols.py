@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from runtime.errors import SettingsError
 from runtime.estimators.linear import System, checked_options, raw_factor
-from runtime.estimators.reduction import Reduction
-from runtime.observation import Observation
-from runtime.study import EstimateSettings
+from runtime.observation.observation import Observation
+from runtime.observation.reduction import Reduction
+from runtime.settings.study import EstimateSettings
 
 
 def system(observation: Observation | Reduction, settings: EstimateSettings) -> System:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse.csgraph import connected_components
 
-from runtime.estimators.triangular import Array, Factor, triangularise
+from runtime.observation.qr_factor import Array, Factor, triangularise
 
 PARTICIPATION = 1e-6
 """Smallest entry of a unit null vector (unit columns of W) by which a parameter belongs to a group."""

@@ -6,7 +6,7 @@
     2. [W_1 W_2 L^-T Y] = Q [[R_11, R_12], [0, R_22]]                the rows project on what W_1 leaves: P = [W_2 L^-T Y] - Q_1 Q_1' [...]
     3. R_22 = U S V', v the last column of V:  X_2 = -L^-T v_2 / v_Y,  X_1 = R_11^-1 (rest of Y - W_2 X_2)
 
-The covariance C_W of the errors of the columns comes from the filters and the sensitivities of the regressor (`runtime.perturbation`). Errors of
+The covariance C_W of the errors of the columns comes from the filters and the sensitivities of the regressor (`runtime.observation.position_errors`). Errors of
 different rows are taken alike, which they are not where a column is a product such as cos(q) qdd: the method stays approximate there. Without any
 noisy column it is least squares, weighted as `weights` says.
 
@@ -29,15 +29,15 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from runtime.errors import SettingsError
-from runtime.estimate import Estimate
 from runtime.estimators import ols, wls
-from runtime.estimators.correlated import block_of_rows, default_block
+from runtime.estimators.block_covariance import block_of_rows, default_block
+from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import System, assemble
-from runtime.estimators.triangular import Array, triangularise
-from runtime.mapping import structure
-from runtime.model import GeneratedModel
-from runtime.observation import Observation
-from runtime.study import EstimateSettings
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.observation.qr_factor import Array, triangularise
+from runtime.settings.schema import structure
+from runtime.settings.study import EstimateSettings
 
 HIDDEN = 0.9
 """s_min / s_W from which the errors assumed explain the columns as well as the motion does."""
@@ -153,7 +153,7 @@ def split_columns(seen: Observation, options: Options) -> Split:
         return Split(np.arange(b), np.arange(0), np.zeros((seen.n, b, b)))
     if seen.errors is None:
         raise SettingsError(
-            "this observation does not know the errors of its columns; make it with runtime.perturbation.with_errors",
+            "this observation does not know the errors of its columns; make it with runtime.observation.position_errors.with_errors",
             path=("estimate", "method"),
         )
     error = np.sqrt(np.einsum("j,jaa->a", np.asarray(seen.rows, dtype=float), seen.errors))

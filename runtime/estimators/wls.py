@@ -21,11 +21,11 @@ from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
 from runtime.errors import SettingsError
 from runtime.estimators.linear import OPTIONS, System, checked_options, raw_factor, whitened
-from runtime.estimators.reduction import Reduction
 from runtime.estimators.solution import joint_scatter, solve
-from runtime.estimators.triangular import Factor, factor
-from runtime.observation import Observation
-from runtime.study import EstimateSettings
+from runtime.observation.observation import Observation
+from runtime.observation.qr_factor import Factor, factor
+from runtime.observation.reduction import Reduction
+from runtime.settings.study import EstimateSettings
 
 CONVERGED = 1e-3
 """Relative change of every s_j at which iterated weights have converged."""

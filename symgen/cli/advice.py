@@ -11,10 +11,10 @@ import typer
 from symgen.cli.session import origin, study_text
 
 if TYPE_CHECKING:
-    from runtime.advice import Advice
-    from runtime.model import GeneratedModel
-    from runtime.record import Record
-    from runtime.study import Study
+    from runtime.model.generated import GeneratedModel
+    from runtime.records.record import Record
+    from runtime.resolution.advice import Advice
+    from runtime.settings.study import Study
     from symgen.cli.writing import Results
 
 
@@ -31,8 +31,8 @@ def advised(
     from rich.console import Console
     from rich.progress import Progress
 
-    from runtime.cestac_result import BIASED
-    from runtime.resolution import advise
+    from runtime.resolution.advisor import advise
+    from runtime.resolution.result import BIASED
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("encoders", total=None)
@@ -56,8 +56,8 @@ def advised(
 
 def study_files(advice: Advice, study: str, title: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
-    from runtime.report.advice import advice_section
-    from runtime.report.html import Page, render
+    from runtime.reporting.page import Page, render
+    from runtime.reporting.resolution_advice import advice_section
     from symgen.cli.pages import settings_section
     from symgen.cli.resolution_files import advice_files
 

@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from runtime.advice import Advice
-    from runtime.cestac_result import Cestac
-    from runtime.estimate import Estimate
-    from runtime.feasibility import Feasibility
-    from runtime.friction import FrictionCurve
-    from runtime.identification import Identification
-    from runtime.loads import Loads
-    from runtime.model import GeneratedModel
-    from runtime.record import Record
-    from runtime.record_stream import Stream
-    from runtime.report.html import Section
-    from runtime.study import Study
+    from runtime.estimators.estimate import Estimate
+    from runtime.estimators.feasibility import Feasibility
+    from runtime.identification.friction import FrictionCurve
+    from runtime.identification.identification import Identification
+    from runtime.identification.payload_study import Loads
+    from runtime.model.generated import GeneratedModel
+    from runtime.records.record import Record
+    from runtime.records.stream import Stream
+    from runtime.reporting.page import Section
+    from runtime.resolution.advice import Advice
+    from runtime.resolution.result import Cestac
+    from runtime.settings.study import Study
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Beside:
         """Paragraphs of the console."""
         parts = []
         if self.feasible:
-            from runtime.report.physical import eigenvalue_table
+            from runtime.reporting.physical import eigenvalue_table
 
             parts.append(eigenvalue_table(self.fit))
         if self.judged is not None:
@@ -71,12 +71,12 @@ class Beside:
 
     def sections(self) -> list[Section]:
         """Sections of the report."""
-        from runtime.report.advice import advice_section
-        from runtime.report.friction import friction_section
-        from runtime.report.html import Section
-        from runtime.report.loads import loads_section
-        from runtime.report.physical import physical_section
-        from runtime.report.sections import resolution_section
+        from runtime.reporting.friction import friction_section
+        from runtime.reporting.page import Section
+        from runtime.reporting.payload import loads_section
+        from runtime.reporting.physical import physical_section
+        from runtime.reporting.resolution_advice import advice_section
+        from runtime.reporting.sections import resolution_section
 
         sections = [physical_section(self.fit)] if self.feasible else []
         if self.judged is not None:
@@ -89,9 +89,9 @@ class Beside:
 
     def files(self) -> dict[str, str | bytes]:
         """Further files of the output folder."""
-        from runtime.report import plots
-        from runtime.report.friction import friction_figure
-        from runtime.report.physical import standard_csv
+        from runtime.reporting import figures as plots
+        from runtime.reporting.friction import friction_figure
+        from runtime.reporting.physical import standard_csv
         from symgen.cli.resolution_files import advice_files, cestac_files
 
         found: dict[str, str | bytes] = {"standard_parameters.csv": standard_csv(self.fit)} if self.feasible else {}
@@ -113,8 +113,8 @@ def beside(
 ) -> Beside:
     """What the study and the options ask for; a load and friction curves need whole records."""
     from runtime.errors import InputError
-    from runtime.record import Record
-    from runtime.report.sections import torque_unit
+    from runtime.records.record import Record
+    from runtime.reporting.sections import torque_unit
 
     whole = [record for record in records if isinstance(record, Record)]
     if (friction or study.payload is not None) and len(whole) < len(records):
@@ -124,12 +124,12 @@ def beside(
     if physical and "standard" not in found.every.details:
         judged = judgement(model, found.every)
     if study.payload is not None:
-        from runtime.io.records import read_records
-        from runtime.loads import loads
+        from runtime.identification.payload_study import loads
+        from runtime.records.reading import read_records
 
         loaded = loads(model, study, whole, read_records(study.payload.record, model, folder=folder), provenance=provenance)
     if friction:
-        from runtime.friction import friction_curves
+        from runtime.identification.friction import friction_curves
 
         curves = friction_curves(model, whole, study, found.every)
     return Beside(found.every, torque_unit(found), judged, loaded, curves)
@@ -137,7 +137,7 @@ def beside(
 
 def judgement(model: GeneratedModel, fit: Estimate) -> Feasibility:
     """Whether a physical robot can have the parameters of an estimate."""
-    from runtime.feasibility import feasibility
-    from runtime.physical import physical_model
+    from runtime.estimators.feasibility import feasibility
+    from runtime.estimators.physical import physical_model
 
     return feasibility(physical_model(model), fit.names, fit.X)

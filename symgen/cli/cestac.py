@@ -24,9 +24,9 @@ from symgen.cli.session import (
 from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
-    from runtime.cestac_result import Cestac
-    from runtime.checkpoint import Checkpoint
-    from runtime.study import Study
+    from runtime.resolution.checkpoint import Checkpoint
+    from runtime.resolution.result import Cestac
+    from runtime.settings.study import Study
 
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
@@ -68,8 +68,8 @@ def cestac(
     given = {"delta": delta, "torque": torque, "runs": runs, "rounding": rounding, "side": side, "seed": seed}
     given["columns"] = columns.split(",") if columns and "," in columns else _one_name(columns)
     with reported_errors(), reserved(output) as results, opened_model(robot) as model:
-        import runtime.cestac as study_of_resolution
-        from runtime.checkpoint import Checkpoint
+        import runtime.resolution.cestac as study_of_resolution
+        from runtime.resolution.checkpoint import Checkpoint
 
         study, folder, records = study_and_records(record, model)
         study = changed(study, {key: value for key, value in given.items() if value is not None})
@@ -105,7 +105,7 @@ def cestac(
 
 def changed(study: Study, given: dict[str, Any]) -> Study:
     """The study with some of its cestac settings replaced, checked like those of a file."""
-    from runtime.study import study_from_mapping, to_mapping
+    from runtime.settings.study import study_from_mapping, to_mapping
 
     mapping = to_mapping(study)
     return study_from_mapping({**mapping, "cestac": {**mapping["cestac"], **given}})
@@ -147,8 +147,8 @@ def verdict_sentence(result: Cestac) -> str:
 
 def study_files(result: Cestac, study: str, title: str) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
-    from runtime.report.html import Page, render
-    from runtime.report.sections import level_numbers, resolution_section
+    from runtime.reporting.page import Page, render
+    from runtime.reporting.sections import level_numbers, resolution_section
     from symgen.cli.pages import settings_section
     from symgen.cli.resolution_files import cestac_files
 

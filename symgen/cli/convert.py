@@ -81,7 +81,7 @@ def _values(file: Path) -> dict[str, float]:
     import csv
     from math import isfinite
 
-    from runtime.io.files import read_bytes
+    from runtime.files import read_bytes
 
     found: dict[str, float] = {}
     try:

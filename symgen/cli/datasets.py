@@ -27,7 +27,7 @@ def datasets(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")
 
 def found() -> list[dict[str, Any]]:
     """What there is, as data."""
-    from runtime.io.datasets import DATASETS, locate
+    from runtime.records.datasets import DATASETS, locate
 
     rows: list[dict[str, Any]] = []
     for name, dataset in DATASETS.items():

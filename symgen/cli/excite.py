@@ -12,12 +12,12 @@ from symgen.cli.session import opened_model, progress_bar, reported_errors, sing
 from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
-    from runtime.excitation import Limits, Weights
-    from runtime.excitation_settings import ExcitationSettings
-    from runtime.model import GeneratedModel
-    from runtime.record import Record
-    from runtime.studies.excitation import Excitation
-    from runtime.study import Study
+    from runtime.excitation.criteria import Limits, Weights
+    from runtime.excitation.search import Excitation
+    from runtime.model.generated import GeneratedModel
+    from runtime.records.record import Record
+    from runtime.settings.excitation import ExcitationSettings
+    from runtime.settings.study import Study
 
 
 @dataclass(frozen=True)
@@ -60,13 +60,13 @@ def excite(
     given: dict[str, Any] = {"criterion": criterion, "starts": starts, "rate": rate, "seed": seed}
     given["columns"] = columns.split(",") if columns and columns not in ("essential", "all") else columns
     with reported_errors(), reserved(output) as results, opened_model(robot) as model:
-        from runtime.excitation import limits_of
-        from runtime.excitation_settings import ExcitationSettings
-        from runtime.io.records import read_records
-        from runtime.io.study_files import study_of
-        from runtime.mapping import structure
-        from runtime.studies.excitation import excite as search
-        from runtime.study import Study, to_mapping
+        from runtime.excitation.criteria import limits_of
+        from runtime.excitation.search import excite as search
+        from runtime.records.reading import read_records
+        from runtime.settings.excitation import ExcitationSettings
+        from runtime.settings.files import study_of
+        from runtime.settings.schema import structure
+        from runtime.settings.study import Study, to_mapping
 
         study = Study()
         records: list[Record] = []
@@ -93,10 +93,10 @@ def _known(model: GeneratedModel, study: Study, settings: ExcitationSettings, re
     import numpy as np
 
     from runtime.errors import InputError
-    from runtime.essential import essential
     from runtime.estimators import estimate
-    from runtime.excitation import kept_correlation, weights_of
-    from runtime.observation import observe, stack
+    from runtime.estimators.essential import essential
+    from runtime.excitation.criteria import kept_correlation, weights_of
+    from runtime.observation.observation import observe, stack
 
     functions: Any = model
     if not records:
@@ -134,8 +134,8 @@ def summary_of(model: GeneratedModel, found: Excitation, known: Known, settings:
     """excitation.json."""
     import numpy as np
 
-    from runtime.excitation import usage
-    from runtime.study import to_mapping
+    from runtime.excitation.criteria import usage
+    from runtime.settings.study import to_mapping
 
     names = known.weights.names
     before = {} if known.before_sigma is None else dict(zip(names, map(float, known.before_sigma), strict=True))
@@ -186,9 +186,9 @@ def excitation_files(
     """Contents of the output folder, by file name."""
     import numpy as np
 
-    from runtime.report import plots
-    from runtime.report.excitation import excitation_page, motion_figure
-    from runtime.report.html import render
+    from runtime.reporting import figures as plots
+    from runtime.reporting.excitation import excitation_page, motion_figure
+    from runtime.reporting.page import render
 
     functions: Any = model
     t, q, qd, qdd = found.motion.sampled(summary["settings"]["rate"])
@@ -208,6 +208,6 @@ def excitation_files(
 
 def json_of(summary: dict[str, Any]) -> str:
     """Text of excitation.json."""
-    from runtime.estimate import json_text
+    from runtime.estimators.estimate import json_text
 
     return json_text(summary)

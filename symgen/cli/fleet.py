@@ -53,9 +53,9 @@ def fleet(
 
 def finished(jobs: Sequence[Job], output: Path | None, workers: int, scheduler: str | None) -> Iterator[Done]:
     """Results as they come; the records of some jobs are read, sent and worked on, then those of the next."""
+    from runtime import distributed
     from runtime.errors import InputError
-    from runtime.processes import results
-    from runtime.studies import distributed
+    from runtime.parallel import results
     from symgen.cli.fleet_jobs import Done, Packer, Parcel, identified
 
     if scheduler and workers:
@@ -74,7 +74,7 @@ def finished(jobs: Sequence[Job], output: Path | None, workers: int, scheduler: 
 
 def summary_text(rows: Sequence[Row]) -> str:
     """The table, then what failed and why."""
-    from runtime.estimate import aligned
+    from runtime.estimators.estimate import aligned
     from symgen.cli.fleet_jobs import shortened
 
     def number(value: float | None, form: str) -> str:
@@ -92,7 +92,7 @@ def summary_text(rows: Sequence[Row]) -> str:
 
 def summary_json(rows: Sequence[Row]) -> str:
     """The table as JSON text."""
-    from runtime.estimate import json_text
+    from runtime.estimators.estimate import json_text
 
     return json_text({"schema": 1, "jobs": rows})
 

@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from runtime.errors import InputError, SettingsError
-from runtime.identification import Identification, identification
-from runtime.io.datasets import DATASETS
-from runtime.io.records import read_records
-from runtime.io.study_files import settings_from_text, text_of
-from runtime.model import GeneratedModel
-from runtime.model_text import ModelText
-from runtime.record import Record
-from runtime.study import SCHEMA, Study
+from runtime.identification.identification import Identification, identification
+from runtime.model.generated import GeneratedModel
+from runtime.model.text import ModelText
+from runtime.records.datasets import DATASETS
+from runtime.records.reading import read_records
+from runtime.records.record import Record
+from runtime.settings.files import settings_from_text, text_of
+from runtime.settings.study import SCHEMA, Study
 from symgen.cli.identify import identification_files
 from symgen.cli.session import opened_model, origin, study_and_records, study_text
 from symgen.errors import SymgenError

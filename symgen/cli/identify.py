@@ -24,10 +24,10 @@ from symgen.cli.session import (
 from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
-    from runtime.closed_loop import Simulator
-    from runtime.identification import Identification
-    from runtime.model import GeneratedModel
-    from runtime.study import Study
+    from runtime.estimators.closed_loop import Simulator
+    from runtime.identification.identification import Identification
+    from runtime.model.generated import GeneratedModel
+    from runtime.settings.study import Study
 
 ONE_BLOCK = 40  # lines of parameters.tex that one page holds; more stand in two blocks
 
@@ -57,10 +57,10 @@ def identify(
     """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code 1 where the record does not determine them."""
     single_thread()
     with reported_errors(), reserved(output) as results, opened_model(robot) as model:
-        from runtime.identification import identification
-        from runtime.io.streams import records_or_streams
-        from runtime.studies.compile_cache import processor
-        from runtime.studies.compiled import target_of
+        from runtime.identification.identification import identification
+        from runtime.model.compile_cache import processor
+        from runtime.model.compiled import target_of
+        from runtime.records.reading_by_blocks import records_or_streams
 
         study, folder = study_with_records(record)
         study = study if block is None else replace(study, stream=block)
@@ -87,8 +87,8 @@ def simulator_of(robot: str, model: GeneratedModel, study: Study) -> Simulator |
 
     if study.estimate.method not in CLOSED_LOOP or study.controller is None:
         return None
-    from runtime.studies.simulation import Simulator
-    from runtime.symbolic_model import load_symbolic
+    from runtime.model.casadi import load_symbolic
+    from runtime.motion.simulation import Simulator
 
     return Simulator(model, study.controller, symbolic=load_symbolic(symbolic_file(robot, model), of=model))
 
@@ -118,7 +118,7 @@ def console_text(found: Identification, more: Beside | None = None) -> str:
 
 def by_record_text(found: Identification) -> str:
     """Errors of several records, and what the time stamps of any were like."""
-    from runtime.report.sections import time_texts
+    from runtime.reporting.sections import time_texts
 
     errors = [
         f"error in {one.name}: {one.relative_error:.2f} % in total, per joint " + " ".join(f"{e:.2f}" for e in one.per_joint)
@@ -137,17 +137,17 @@ def estimate_json(found: Identification, more: Beside | None = None) -> str:
     """estimate.json: the Estimate of all parameters, and beside it the essential ones, validation, coupling and verdict."""
     import json
 
-    from runtime.estimate import json_text
+    from runtime.estimators.estimate import json_text
 
     return json_text({**json.loads(found.every.to_json()), **found.summary(), **({} if more is None else more.summary())})
 
 
 def identification_files(found: Identification, study: str, more: Beside | None = None) -> dict[str, str | bytes]:
     """Contents of the output folder, by file name."""
-    from runtime.exports import array_files, estimate_arrays
-    from runtime.report import plots
-    from runtime.report.html import render
-    from runtime.report.sections import parameters_csv, torque_unit
+    from runtime.reporting import figures as plots
+    from runtime.reporting.arrays import array_files, estimate_arrays
+    from runtime.reporting.page import render
+    from runtime.reporting.sections import parameters_csv, torque_unit
     from symgen.cli.pages import identification_page
 
     unit = torque_unit(found)

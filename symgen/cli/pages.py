@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from symgen.cli.session import SIMULATED_WARNING
 
 if TYPE_CHECKING:
-    from runtime.identification import Identification
-    from runtime.judgement import Judgement
-    from runtime.report.html import Page, Section
+    from runtime.identification.checklist import Judgement
+    from runtime.identification.identification import Identification
+    from runtime.reporting.page import Page, Section
     from symgen.cli.beside import Beside
 
 
@@ -25,9 +25,9 @@ def identification_page(
     shown: Sequence[Section] = (),
 ) -> Page:
     """The page. study : text of study.yaml.   warning : before the one on simulated data.   verdict : instead of that of the identification.   shown : further sections after the torques."""
-    from runtime.report.html import Page
-    from runtime.report.judgement import checks_section, key_numbers
-    from runtime.report.sections import identification_sections
+    from runtime.reporting.checklist import checks_section, key_numbers
+    from runtime.reporting.page import Page
+    from runtime.reporting.sections import identification_sections
 
     judgement = judged(found, more)
     parameters, torques, *others = identification_sections(found)
@@ -57,21 +57,21 @@ def identification_page(
 
 def judged(found: Identification, more: Beside | None = None) -> Judgement:
     """The judgement, with what was computed beside the parameters."""
-    from runtime.judgement import judge
+    from runtime.identification.checklist import judge
 
     return judge(found) if more is None else judge(found, feasibility=more.judged, advice=more.advice)
 
 
 def settings_section(study: str) -> Section:
     """Every setting, folded."""
-    from runtime.report.html import Section
+    from runtime.reporting.page import Section
 
     return Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
 
 
 def provenance_section(found: Identification) -> Section:
     """Hashes and versions that reproduce the result."""
-    from runtime.report.html import Section, Table
+    from runtime.reporting.page import Section, Table
 
     provenance = found.every.provenance
     rows = [("robot file", provenance["robot"], f"SHA-256 {provenance['robot_sha256']}")]

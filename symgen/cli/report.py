@@ -13,11 +13,11 @@ from symgen.cli.session import NEGATIVE, RECORDS, opened_model, origin, reported
 from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
-    from runtime.identification import Identification
-    from runtime.model import GeneratedModel
-    from runtime.record import Record
-    from runtime.record_stream import Stream
-    from runtime.study import Study
+    from runtime.identification.identification import Identification
+    from runtime.model.generated import GeneratedModel
+    from runtime.records.record import Record
+    from runtime.records.stream import Stream
+    from runtime.settings.study import Study
     from symgen.cli.beside import Beside
 
 T = TypeVar("T")
@@ -43,9 +43,9 @@ def report(
     """
     single_thread()
     with reported_errors(), reserved(output) as results, opened_model(robot) as model:
-        from runtime.estimate import json_text
-        from runtime.identification import identification
-        from runtime.io.streams import records_or_streams
+        from runtime.estimators.estimate import json_text
+        from runtime.identification.identification import identification
+        from runtime.records.reading_by_blocks import records_or_streams
         from symgen.cli.cestac import changed
         from symgen.cli.identify import identification_files, simulator_of
         from symgen.cli.pages import judged
@@ -87,10 +87,10 @@ def everything(
     provenance: dict[str, Any],
 ) -> Beside:
     """What stands beside the parameters, as far as record, study and installed extras allow; why where they do not."""
-    from runtime.cestac import cestac
-    from runtime.friction import friction_curves
-    from runtime.record import Record
-    from runtime.resolution import advise
+    from runtime.identification.friction import friction_curves
+    from runtime.records.record import Record
+    from runtime.resolution.advisor import advise
+    from runtime.resolution.cestac import cestac
     from symgen.cli.beside import beside, judgement
 
     more = beside(model, study, folder, records, found, provenance)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from runtime.advice import Advice
-    from runtime.cestac_result import Cestac
+    from runtime.resolution.advice import Advice
+    from runtime.resolution.result import Cestac
 
 
 def cestac_files(result: Cestac, *, curve: Cestac | None = None, names: Sequence[str] = ()) -> dict[str, str | bytes]:
@@ -15,8 +15,8 @@ def cestac_files(result: Cestac, *, curve: Cestac | None = None, names: Sequence
 
     curve : the study that the figure shows, `result` without one.   names : parameters drawn in colour.
     """
-    from runtime.exports import array_files, cestac_arrays, cestac_csv
-    from runtime.report import plots
+    from runtime.reporting import figures as plots
+    from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv
 
     files: dict[str, str | bytes] = {"cestac.json": result.to_json(), "cestac.csv": cestac_csv(result), "cestac.tex": result.to_latex()}
     files |= array_files("cestac", cestac_arrays(result))
@@ -29,8 +29,8 @@ def cestac_files(result: Cestac, *, curve: Cestac | None = None, names: Sequence
 
 def advice_files(advice: Advice) -> dict[str, str | bytes]:
     """advice.json and the figure, by file name."""
-    from runtime.report import plots
-    from runtime.report.advice import advice_figure
+    from runtime.reporting import figures as plots
+    from runtime.reporting.resolution_advice import advice_figure
 
     figure = advice_figure(advice)
     return {"advice.json": advice.to_json(), "advice.png": plots.png(figure), "advice.svg": plots.svg(figure)}

@@ -26,6 +26,6 @@ def text_of(kind: str) -> str:
         from symgen.description.schema import schema_text as robot_schema
 
         return robot_schema()
-    from runtime.documents import schema_text
+    from runtime.json_documents import schema_text
 
     return schema_text(kind)

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 if TYPE_CHECKING:
-    from runtime.model import GeneratedModel
-    from runtime.record import Record
-    from runtime.record_stream import Stream
-    from runtime.study import Study
+    from runtime.model.generated import GeneratedModel
+    from runtime.records.record import Record
+    from runtime.records.stream import Stream
+    from runtime.settings.study import Study
 
 BAD_INPUT, NEGATIVE = 2, 1
 RECORDS = "Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side). Further measured files like the first: records of their own."
@@ -82,12 +82,12 @@ def opened_model(robot: str) -> Iterator[GeneratedModel]:
 
     A robot is emitted into a folder that lives as long as the block, since other processes load the model from its file.
     """
-    from runtime.model import load_model
+    from runtime.model.generated import load_model
 
     if Path(robot).suffix == ".py":
         yield load_model(Path(robot))
         return
-    from runtime.io.table import is_measured
+    from runtime.records.formats.table import is_measured
     from symgen.description import load_robot
     from symgen.emit import generate_module
 
@@ -105,8 +105,8 @@ def in_target(robot: str, model: GeneratedModel, target: str) -> GeneratedModel:
     """`model` or, for target "c", the same in C, inside the block of `opened_model`: one line says why where NumPy serves instead."""
     import warnings
 
-    from runtime.studies.compiled import compiled_model
-    from runtime.studies.fused_cestac import usable
+    from runtime.model.compiled import compiled_model
+    from runtime.resolution.c.cestac_run import usable
 
     if target not in ("numpy", "c"):
         fail(f"--target {target}; expected numpy or c")
@@ -146,7 +146,7 @@ def symbolic_file(robot: str, model: GeneratedModel) -> Path:
 
 def study_and_records(record: str | Sequence[str], model: GeneratedModel) -> tuple[Study, Path, list[Record]]:
     """The study that one RECORD argument means, or several, the folder of its files, and its records."""
-    from runtime.io.records import read_records
+    from runtime.records.reading import read_records
 
     study, folder = study_with_records([record] if isinstance(record, str) else record)
     return study, folder, read_records(study.record, model, folder=folder)
@@ -158,8 +158,8 @@ def study_with_records(records: Sequence[str]) -> tuple[Study, Path]:
     The first says how they are read: a study file, a dataset or a measured file; each further one is a measured file like it, a record of its own.
     """
     from runtime.errors import InputError
-    from runtime.io.study_files import study_of
-    from runtime.io.table import is_measured
+    from runtime.records.formats.table import is_measured
+    from runtime.settings.files import study_of
 
     study, folder = study_of(records[0])
     if not study.record:
@@ -187,7 +187,7 @@ def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
 
 def study_text(study: Study, folder: Path, destination: Path) -> str:
     """study.yaml: every setting, defaults included; files relative to `destination`, where the study is written."""
-    from runtime.study import RecordSettings, to_mapping
+    from runtime.settings.study import RecordSettings, to_mapping
 
     def moved(settings: RecordSettings) -> RecordSettings:
         if settings.dataset is not None:

@@ -13,9 +13,9 @@ from symgen.cli.writing import reserved
 if TYPE_CHECKING:
     import numpy as np
 
-    from runtime.model import GeneratedModel
-    from runtime.simulation_result import Simulation
-    from runtime.study import Study
+    from runtime.model.generated import GeneratedModel
+    from runtime.motion.result import Simulation
+    from runtime.settings.study import Study
 
 RECORD = "simulated.csv"
 
@@ -35,12 +35,12 @@ def simulate(
     """
     single_thread()
     with reported_errors(), reserved(output) as results, opened_model(robot) as model:
-        from runtime.estimate import json_text
-        from runtime.io.records import read_records
-        from runtime.io.study_files import study_of
-        from runtime.reference import reference_of
-        from runtime.studies.simulation import Simulator, parameters_of
-        from runtime.symbolic_model import load_symbolic
+        from runtime.estimators.estimate import json_text
+        from runtime.model.casadi import load_symbolic
+        from runtime.motion.reference import reference_of
+        from runtime.motion.simulation import Simulator, parameters_of
+        from runtime.records.reading import read_records
+        from runtime.settings.files import study_of
 
         settings, folder = study_of(study)
         controller = settings.controller
@@ -62,7 +62,7 @@ def summary_of(model: GeneratedModel, found: Simulation, X: np.ndarray, *, ideal
     """simulation.json."""
     import numpy as np
 
-    from runtime.studies.simulation_friction import REST
+    from runtime.motion.dry_friction import REST
 
     error = found.q - found.q_r
     return {
@@ -88,10 +88,10 @@ def simulation_files(
     """Contents of the output folder: the record, a study that reads it back, figures of merit, the figure."""
     from dataclasses import replace
 
-    from runtime.estimate import json_text
-    from runtime.report.plots import png, svg
-    from runtime.report.simulation import simulation_figure
-    from runtime.study import RecordSettings
+    from runtime.estimators.estimate import json_text
+    from runtime.reporting.figures import png, svg
+    from runtime.reporting.simulation import simulation_figure
+    from runtime.settings.study import RecordSettings
 
     figure = simulation_figure(model.JOINTS, found, units(model))
     record = RecordSettings(files=(RECORD,), rate=found.rate, name=found.name)
@@ -118,7 +118,7 @@ def console_text(model: GeneratedModel, found: Simulation) -> str:
     """Tracking error and torque of each joint."""
     import numpy as np
 
-    from runtime.studies.simulation_friction import REST
+    from runtime.motion.dry_friction import REST
 
     error = np.abs(found.q - found.q_r)
     lines = [

@@ -55,7 +55,7 @@ def snippet(
 
 def with_estimate(robot: Robot, file: Path) -> Robot:
     """The robot with the standard parameters of a feasible estimate as its values; exit code 2 where the file has none or is of another robot."""
-    from runtime.estimate import load_estimate
+    from runtime.estimators.estimate import load_estimate
     from runtime.json_values import number
 
     standard = load_estimate(file).details.get("standard")

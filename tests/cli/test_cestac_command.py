@@ -7,7 +7,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from runtime.checkpoint import Checkpoint
+from runtime.resolution.checkpoint import Checkpoint
 from symgen.cli.cestac import cestac
 
 FILES = {"report.html", "study.yaml", "resolution.png", "resolution.svg"} | {

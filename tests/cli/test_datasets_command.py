@@ -4,7 +4,7 @@ import json
 
 from typer.testing import CliRunner
 
-from runtime.io.datasets import DATASETS
+from runtime.records.datasets import DATASETS
 from symgen.cli.main import app
 
 
@@ -14,7 +14,7 @@ def run(*arguments):
 
 def test_nothing_here(tmp_path, monkeypatch):
     monkeypatch.setenv("SYMGEN_DATA", str(tmp_path))
-    monkeypatch.setattr("runtime.io.datasets.pooch.os_cache", lambda name: tmp_path / "cache")
+    monkeypatch.setattr("runtime.records.datasets.pooch.os_cache", lambda name: tmp_path / "cache")
     result = run()
     assert result.exit_code == 0
     assert all(sha in result.stdout for dataset in DATASETS.values() for sha in dataset.files.values())

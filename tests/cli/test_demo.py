@@ -7,16 +7,17 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from runtime.controller_settings import Points
-from runtime.io.datasets import dataset_study
-from runtime.io.records import read_records
-from runtime.reference import point_to_point
-from runtime.study import study_from_mapping
-from symgen.cli import chapter_tables, simulated
-from symgen.cli import demo as module
-from symgen.cli.demo_sections import differences
-from symgen.cli.demonstration import demonstrate
+from runtime.motion.reference import point_to_point
+from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
+from runtime.settings.controller import Points
+from runtime.settings.study import study_from_mapping
 from symgen.cli.session import opened_model
+from symgen.demo import chapter_tables
+from symgen.demo import simulated_record as simulated
+from symgen.demo import tx40 as module
+from symgen.demo.demonstration import demonstrate
+from symgen.demo.sections import differences
 
 
 def run(*arguments):
@@ -31,8 +32,8 @@ def offline(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("SYMGEN_DATA", raising=False)
-        patch.setattr("runtime.io.datasets.pooch.os_cache", lambda name: folder / "cache")
-        patch.setattr("runtime.io.datasets.pooch.HTTPDownloader", lambda timeout: _refused)
+        patch.setattr("runtime.records.datasets.pooch.os_cache", lambda name: folder / "cache")
+        patch.setattr("runtime.records.datasets.pooch.HTTPDownloader", lambda timeout: _refused)
         result = run("-o", folder / "out", "--quick")
     return result, folder / "out"
 

@@ -8,8 +8,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from symgen.cli import demo as module
-from symgen.cli import haptic_record, haptic_tables, simulated
+from symgen.demo import haptic_record, haptic_tables
+from symgen.demo import simulated_record as simulated
+from symgen.demo import tx40 as module
 from symgen.description import load_robot
 
 # chapter, Tables 6 and 7: the fourteen parameters in the order printed, fC as FS

@@ -8,7 +8,7 @@ import pytest
 from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
-from runtime.trajectories import motion_from_mapping
+from runtime.settings.trajectories import motion_from_mapping
 from symgen.cli.main import app
 
 STUDY = """

@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from runtime.model import load_model
+from runtime.model.generated import load_model
 from symgen.cli.fleet import fleet
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"

@@ -9,8 +9,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from runtime.estimate import Estimate
-from runtime.io.study_files import load_study
+from runtime.estimators.estimate import Estimate
+from runtime.settings.files import load_study
 from symgen.cli.identify import identify
 from symgen.cli.main import app
 from symgen.cli.writing import write_all
@@ -188,7 +188,7 @@ def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
     """Unless the study says otherwise; the result says so."""
     t = np.arange(3000) / 1000
     np.savez(tmp_path / "axis.npz", t=t, q1=0.2 * np.sin(6 * t), tau1=20 * np.cos(6 * t))
-    monkeypatch.setattr("runtime.io.streams.LARGE", 1000)
+    monkeypatch.setattr("runtime.records.reading_by_blocks.LARGE", 1000)
     settings = json.loads(run("emps", tmp_path / "axis.npz", "--json").stdout)["settings"]
     assert settings["stream"] == {"block": 65536}
     (tmp_path / "study.yaml").write_text("record: {files: axis.npz}\nstream: off\n")
@@ -197,6 +197,6 @@ def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
 
 
 def test_report_says_what_its_figures_leave_out(tx40_data, tmp_path, monkeypatch):
-    monkeypatch.setattr("runtime.streaming.SHOWN", 300)
+    monkeypatch.setattr("runtime.observation.by_blocks.SHOWN", 300)
     assert run("tx40", "tx40", "--block", 20000, "-o", tmp_path).exit_code == 0
     assert "figures show the first 1782 of 5592 rows" in (tmp_path / "report.html").read_text(encoding="utf-8")  # 6 (300 - 3), 6 (938 - 6)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from runtime.model import load_model
+from runtime.model.generated import load_model
 from symgen.cli.main import app
 from symgen.description import load_robot
 from symgen.emit import generate_module

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from runtime.io.study_files import load_study
+from runtime.settings.files import load_study
 from symgen.cli.main import app
 
 FILES = {"report.html", "estimate.json", "parameters.csv", "study.yaml", "torques.png", "friction.png", "advice.json", "cestac.json"}

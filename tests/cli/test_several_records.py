@@ -8,10 +8,10 @@ from typer.testing import CliRunner
 
 from runtime import load_model, study_from_mapping
 from runtime.errors import SettingsError
-from runtime.essential import essential
-from runtime.io.streams import open_streams
-from runtime.record_errors import record_errors
-from runtime.streaming import reduce_records
+from runtime.estimators.essential import essential
+from runtime.identification.record_errors import record_errors
+from runtime.observation.by_blocks import reduce_records
+from runtime.records.reading_by_blocks import open_streams
 from symgen.cli.main import app
 
 RATE = 500

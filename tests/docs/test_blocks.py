@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from runtime.io.study_files import settings_from_text, study_from_text
+from runtime.settings.files import settings_from_text, study_from_text
 from symgen.cli.fleet_jobs import FleetSettings
 from symgen.description.schema import RobotFile
 

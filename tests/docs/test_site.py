@@ -18,7 +18,7 @@ from browser import started_browser
 
 import runtime
 import symgen
-from runtime.study import Study
+from runtime.settings.study import Study
 from symgen.cli.main import VERBS
 from symgen.description import packaged_robots
 

@@ -19,7 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from runtime.model_shape import check_source
+from runtime.model.source_check import check_source
 from symgen.cli.main import app
 from symgen.description import load_robot, parse_robot, read_par, write_par, write_yaml
 from symgen.description.urdf import read_urdf

@@ -9,7 +9,7 @@ import pytest
 
 from oracles.pinocchio_model import element_columns
 from oracles.random_robots import random_robot
-from runtime.model_source import check_source
+from runtime.model.loading import check_source
 from symgen.description import load_robot, packaged_robots
 from symgen.emit.physical import physical_tables
 

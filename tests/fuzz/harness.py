@@ -85,9 +85,9 @@ def serve(pipe, folder: Path) -> None:
         "h5py",
         "mujoco",
         "symgen.emit",
-        "runtime.io.streams",
-        "runtime.estimate",
-        "runtime.model",
+        "runtime.records.reading_by_blocks",
+        "runtime.estimators.estimate",
+        "runtime.model.generated",
         "symgen.cli.fleet_jobs",
     ):
         __import__(module)

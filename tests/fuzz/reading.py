@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from runtime.study import Columns
+    from runtime.settings.study import Columns
 
 
 def read_robot(path: Path) -> object:
@@ -29,7 +29,7 @@ def read_robot(path: Path) -> object:
 
 def read_and_derive(path: Path) -> object:
     """Small robots are derived and emitted as well, and the module is checked as a file is."""
-    from runtime.model_source import check_source
+    from runtime.model.loading import check_source
     from symgen.description import load_robot
     from symgen.emit import generate_module
 
@@ -40,8 +40,8 @@ def read_and_derive(path: Path) -> object:
 
 
 def read_study(path: Path) -> object:
-    from runtime.io.study_files import load_study
-    from runtime.study import to_mapping
+    from runtime.settings.files import load_study
+    from runtime.settings.study import to_mapping
     from symgen.cli.session import study_text
 
     study = load_study(path)
@@ -56,8 +56,8 @@ def read_fleet(path: Path) -> object:
 
 
 def read_motion(path: Path) -> object:
-    from runtime.io.study_files import load_study
-    from runtime.reference import reference_of
+    from runtime.motion.reference import reference_of
+    from runtime.settings.files import load_study
 
     study = load_study(path)
     if study.controller is not None and study.controller.reference.motion is not None:
@@ -75,10 +75,10 @@ def two_joints() -> object:
 def read_record(path: Path) -> object:
     """Whole and, where the format has it, by blocks: both give the same samples or both refuse."""
     from runtime.errors import InputError
-    from runtime.io.records import read_record as read
-    from runtime.io.streams import open_stream
-    from runtime.io.table import BLOCK_READERS
-    from runtime.study import RecordSettings
+    from runtime.records.formats.table import BLOCK_READERS
+    from runtime.records.reading import read_record as read
+    from runtime.records.reading_by_blocks import open_stream
+    from runtime.settings.study import RecordSettings
 
     settings = RecordSettings(files=(path.name,), columns=columns_of(path))
     whole: object = None
@@ -106,7 +106,7 @@ def read_record(path: Path) -> object:
 
 
 def columns_of(path: Path) -> Columns:
-    from runtime.study import Columns
+    from runtime.settings.study import Columns
 
     if path.suffix == ".npy":
         return Columns(t="1", q=("2", "3"), tau=("4", "5"))
@@ -124,13 +124,13 @@ def read_folder(path: Path) -> object:
 
 
 def read_model(path: Path) -> object:
-    from runtime.model import load_model
+    from runtime.model.generated import load_model
 
     return load_model(path)
 
 
 def read_checkpoint(path: Path) -> object:
-    from runtime.checkpoint import Checkpoint
+    from runtime.resolution.checkpoint import Checkpoint
 
     folder = path.parent / "runs"
     folder.mkdir(exist_ok=True)
@@ -140,7 +140,7 @@ def read_checkpoint(path: Path) -> object:
 
 
 def read_settings(path: Path) -> object:
-    from runtime.checkpoint import Checkpoint
+    from runtime.resolution.checkpoint import Checkpoint
 
     folder = path.parent / "runs"
     folder.mkdir(exist_ok=True)
@@ -150,7 +150,7 @@ def read_settings(path: Path) -> object:
 
 def read_estimate(path: Path) -> object:
     """What is read can be shown and written, and is read again with the same bits."""
-    from runtime.estimate import Estimate, load_estimate
+    from runtime.estimators.estimate import Estimate, load_estimate
 
     found = load_estimate(path)
     text = found.to_json()

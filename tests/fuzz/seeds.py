@@ -165,8 +165,8 @@ def bag_tables() -> tuple[dict, ...]:
 
 @cache
 def study_tables() -> tuple[dict, ...]:
-    from runtime.io.datasets import dataset_study
-    from runtime.study import Study, study_from_mapping, to_mapping
+    from runtime.records.datasets import dataset_study
+    from runtime.settings.study import Study, study_from_mapping, to_mapping
 
     small = {"symgen": 1, "record": {"files": ["a.csv"], "rate": 1000}, "cestac": {"delta": ["2*pi/10000"], "runs": 3}, "stream": "off"}
     rich = small | {
@@ -226,10 +226,10 @@ def estimate_file() -> bytes:
     from hashlib import sha256
 
     from runtime.estimators import estimate
-    from runtime.model_text import ModelText  # a model from text, checked like any file
-    from runtime.observation import observe, stack
-    from runtime.record import Record
-    from runtime.study import study_from_mapping
+    from runtime.model.text import ModelText  # a model from text, checked like any file
+    from runtime.observation.observation import observe, stack
+    from runtime.records.record import Record
+    from runtime.settings.study import study_from_mapping
     from symgen.description import load_robot
     from symgen.emit import generate_module
 

@@ -14,12 +14,12 @@ from fuzz.archives import npy_header, plain_npy
 from fuzz.harness import Reader
 from fuzz.seeds import csv_file, model_files, npz_members, robot_file, urdf_files
 from runtime.errors import InputError
-from runtime.io.files import read_bytes
-from runtime.io.records import read_record
-from runtime.io.streams import open_stream
-from runtime.io.study_files import load_study
-from runtime.model import load_model
-from runtime.study import RecordSettings
+from runtime.files import read_bytes
+from runtime.model.generated import load_model
+from runtime.records.reading import read_record
+from runtime.records.reading_by_blocks import open_stream
+from runtime.settings.files import load_study
+from runtime.settings.study import RecordSettings
 from symgen.description import load_robot
 from symgen.errors import DescriptionError
 
@@ -274,7 +274,7 @@ def test_large_files(tmp_path):
 
 @pytest.mark.parametrize("data", ["/dev/null", "/nonexistent", "/proc/self/mem", "\n", "a" * 5000])
 def test_symgen_data(monkeypatch, tmp_path, data):
-    from runtime.io.datasets import locate
+    from runtime.records.datasets import locate
 
     monkeypatch.setenv("SYMGEN_DATA", data)
     assert locate("emps", "DATA_EMPS.mat", cache=tmp_path) is None

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from runtime import load_model
-from runtime.studies import fused, fused_check
-from runtime.studies.compiled import CompiledModel, compiled_model
+from runtime.model.compiled import CompiledModel, compiled_model
+from runtime.resolution.c import kernels as fused
+from runtime.resolution.c import self_test as fused_check
 from symgen.description.robot import Robot
 from symgen.emit import generate_files
 

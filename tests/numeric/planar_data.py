@@ -3,9 +3,9 @@
 import numpy as np
 import planar_2r_model as planar
 
-from runtime.observation import Observation
-from runtime.record import Record
-from runtime.study import EstimateSettings
+from runtime.observation.observation import Observation
+from runtime.records.record import Record
+from runtime.settings.study import EstimateSettings
 
 OLS = EstimateSettings()
 WLS = EstimateSettings(method="wls")

@@ -6,10 +6,10 @@ from types import ModuleType
 
 import pytest
 
-from runtime.array_model import load_arrays
 from runtime.errors import ModelError
-from runtime.model import load_model
-from runtime.model_source import check_source
+from runtime.model.array_model import load_arrays
+from runtime.model.generated import load_model
+from runtime.model.loading import check_source
 
 pytest.importorskip("array_api_compat")
 

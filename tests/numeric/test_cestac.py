@@ -10,17 +10,17 @@ import pytest
 from planar_data import TRUE, motion, record
 from scipy.stats import t
 
-from runtime.cestac import cestac, key_blocks, levels_of
-from runtime.cestac_result import Level, deciding_names, level_result, runs_needed
-from runtime.cestac_run import perturbed_position, perturbed_torque
-from runtime.drives import Drives
 from runtime.errors import InputError, ModelError, SettingsError
 from runtime.estimators import estimate
-from runtime.model_text import ModelText
-from runtime.observation import Observation, decimated_torque, observation_from_states, observe, select_rows
-from runtime.runs import Run, Runs
-from runtime.signals import filtered_states
-from runtime.study import CestacSettings, EstimateSettings, Lowpass, Signals, Study
+from runtime.model.drives import Drives
+from runtime.model.text import ModelText
+from runtime.observation.filters import filtered_states
+from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, select_rows
+from runtime.resolution.cestac import cestac, key_blocks, levels_of
+from runtime.resolution.result import Level, deciding_names, level_result, runs_needed
+from runtime.resolution.run import perturbed_position, perturbed_torque
+from runtime.resolution.runs import Run, Runs
+from runtime.settings.study import CestacSettings, EstimateSettings, Lowpass, Signals, Study
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20))
 RECORD = record()

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.cestac import cestac
-from runtime.essential import essential
 from runtime.estimators import estimate
-from runtime.io.datasets import dataset_study
-from runtime.io.records import read_records
-from runtime.model import load_model
-from runtime.observation import observe
-from runtime.study import EstimateSettings, study_from_mapping
-from runtime.validation import split_validation
+from runtime.estimators.essential import essential
+from runtime.identification.validation import split_validation
+from runtime.model.generated import load_model
+from runtime.observation.observation import observe
+from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
+from runtime.resolution.cestac import cestac
+from runtime.settings.study import EstimateSettings, study_from_mapping
 
 MODEL = Path(__file__).resolve().parents[2] / "generated" / "tx40.py"
 # Table 2: value, tolerance in % (ours: what this record gives, with the treatment of low speed moving FS against FV)

@@ -15,11 +15,11 @@ import planar_2r_model as planar
 import pytest
 from planar_data import record
 
-from runtime.cestac import cestac
-from runtime.checkpoint import Checkpoint
 from runtime.errors import InputError
-from runtime.runs import Run, Runs
-from runtime.study import CestacSettings, Lowpass, Signals, Study
+from runtime.resolution.cestac import cestac
+from runtime.resolution.checkpoint import Checkpoint
+from runtime.resolution.runs import Run, Runs
+from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
 
 RECORD = record(N=3000)
 HERE = Path(__file__).parent

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from runtime import InputError, SettingsError, load_model, read_records, study_from_mapping
-from runtime.closed_loop import closed_loop, slips, slowest
-from runtime.estimators import estimate, iteration
-from runtime.io.datasets import dataset_study
-from runtime.observation import observe
-from runtime.reference import Reference, reference_of
-from runtime.studies.simulation import Simulator, parameters_of
-from runtime.study import EstimateSettings
+from runtime.estimators import estimate
+from runtime.estimators import fixed_point as iteration
+from runtime.estimators.closed_loop import closed_loop, slips, slowest
+from runtime.motion.reference import Reference, reference_of
+from runtime.motion.simulation import Simulator, parameters_of
+from runtime.observation.observation import observe
+from runtime.records.datasets import dataset_study
+from runtime.settings.study import EstimateSettings
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 SIMULATING = ("iv", "didim", "cloe")

@@ -17,7 +17,7 @@ import pytest
 
 from runtime import GeneratedModel, load_model
 from runtime.errors import InputError
-from runtime.studies.compiled import CompiledModel, FallbackWarning, cache_folder, compiled_model
+from runtime.model.compiled import CompiledModel, FallbackWarning, cache_folder, compiled_model
 from symgen.description import load_robot, parse_robot
 from symgen.emit import generate_files
 
@@ -226,7 +226,7 @@ def test_an_object_of_another_processor_is_replaced(model: GeneratedModel, tmp_p
 def test_two_processes_at_once(folder: Path, tmp_path: Path) -> None:
     code = (
         "import sys, warnings\nwarnings.simplefilter('error')\nfrom pathlib import Path\nfrom runtime import load_model\n"
-        "from runtime.studies.compiled import compiled_model\n"
+        "from runtime.model.compiled import compiled_model\n"
         f"print(type(compiled_model(load_model('{NAME}', folder=Path(sys.argv[1])))).__name__)"
     )
     environment = {**os.environ, "SYMGEN_CACHE": str(tmp_path / "new")}
@@ -300,7 +300,7 @@ FULL = """
 import resource, sys, warnings
 from pathlib import Path
 from runtime import load_model
-from runtime.studies.compiled import compiled_model
+from runtime.model.compiled import compiled_model
 model = load_model("planar_2r", folder=Path(sys.argv[1]))
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
 with warnings.catch_warnings(record=True) as seen:

@@ -7,9 +7,9 @@ import pooch
 import pytest
 
 from runtime.errors import DataUnavailableError, InputError
-from runtime.io import datasets
-from runtime.io.datasets import DATASETS, Dataset, dataset_study, fetch, locate
-from runtime.study import study_from_mapping
+from runtime.records import datasets
+from runtime.records.datasets import DATASETS, Dataset, dataset_study, fetch, locate
+from runtime.settings.study import study_from_mapping
 
 CONTENT = b"q1,tau1\n1,2\n"
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from runtime.decimation import Decimation, decimate, operator, plan
+from runtime.observation.decimation import Decimation, decimate, operator, plan
 
 
 @pytest.mark.parametrize("offset", [0, 100])

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from runtime.errors import InputError
-from runtime.signals import decimated, decimation_plan
-from runtime.stages import StreamedDecimation
-from runtime.study import Decimate
+from runtime.observation.filters import decimated, decimation_plan
+from runtime.observation.streaming_filters import StreamedDecimation
+from runtime.settings.study import Decimate
 
 SCIPY, MATLAB = Decimate(), Decimate(phase="last", padding="matlab")
 

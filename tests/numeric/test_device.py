@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from runtime.array_model import load_arrays
-from runtime.cestac import cestac
-from runtime.decimation import decimate as decimated
-from runtime.decimation import plan
 from runtime.errors import InputError, SettingsError
-from runtime.model import load_model
-from runtime.record import Record
-from runtime.signals import butterworth, lowpass_filtered
-from runtime.signals import derivative as differentiated
-from runtime.studies.array_filters import decimate, derivative, lowpass_modes, scan, zero_phase
-from runtime.studies.device import Device, arrays_like, to_host
-from runtime.study import CestacSettings, Decimate, EstimateSettings, Lowpass, Signals, Study
+from runtime.model.array_model import load_arrays
+from runtime.model.generated import load_model
+from runtime.observation.decimation import decimate as decimated
+from runtime.observation.decimation import plan
+from runtime.observation.filters import butterworth, lowpass_filtered
+from runtime.observation.filters import derivative as differentiated
+from runtime.records.record import Record
+from runtime.resolution.array_filters import decimate, derivative, lowpass_modes, scan, zero_phase
+from runtime.resolution.cestac import cestac
+from runtime.resolution.device import Device, arrays_like, to_host
+from runtime.settings.study import CestacSettings, Decimate, EstimateSettings, Lowpass, Signals, Study
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

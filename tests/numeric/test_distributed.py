@@ -12,10 +12,10 @@ import typer
 from planar_data import record
 from typer.testing import CliRunner
 
-from runtime.cestac import cestac
+from runtime.distributed import results
 from runtime.errors import InputError
-from runtime.studies.distributed import results
-from runtime.study import CestacSettings, Lowpass, Signals, Study
+from runtime.resolution.cestac import cestac
+from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
 from symgen.cli.fleet import fleet
 
 dask = pytest.importorskip("distributed")

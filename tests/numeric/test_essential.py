@@ -8,9 +8,9 @@ import pytest
 from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 
 from runtime.errors import SettingsError
-from runtime.essential import essential
 from runtime.estimators import estimate
-from runtime.study import EssentialSettings, EstimateSettings
+from runtime.estimators.essential import essential
+from runtime.settings.study import EssentialSettings, EstimateSettings
 
 
 def eliminated(seen, threshold):

@@ -7,8 +7,8 @@ import planar_2r_model as planar
 import pytest
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
-from runtime.estimate import Estimate, json_text
 from runtime.estimators import estimate
+from runtime.estimators.estimate import Estimate, json_text
 
 
 @pytest.fixture(scope="module")

@@ -12,10 +12,10 @@ from scipy.signal import lfilter
 
 from runtime.errors import SettingsError
 from runtime.estimators import LINEAR, METHODS, estimate, linear_system
-from runtime.estimators.correlated import block_of_rows
+from runtime.estimators.block_covariance import block_of_rows
 from runtime.estimators.solution import null_groups, solve
-from runtime.estimators.triangular import combine, factor
-from runtime.study import EstimateSettings
+from runtime.observation.qr_factor import combine, factor
+from runtime.settings.study import EstimateSettings
 
 EVERY = [OLS, WLS, EstimateSettings(method="wls", weights="iterated"), EstimateSettings(method="wls", weights="covariance")]
 KINDS = ["ols", "wls", "wls iterated", "wls covariance"]

@@ -9,16 +9,16 @@ import pytest
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators import estimate
-from runtime.excitation import excesses, limits_of, observed, usage, weights_of
-from runtime.excitation_settings import ExcitationSettings, Sphere
-from runtime.mapping import structure
-from runtime.model import load_model
-from runtime.observation import observe
-from runtime.record import Record
-from runtime.studies.excitation import Problem, _search, excite, one_start, smoothed
-from runtime.study import Decimate, Lowpass, Signals, Study
-from runtime.symbolic_model import load_symbolic
-from runtime.trajectories import Motion, Part, motion_from_mapping
+from runtime.excitation.criteria import excesses, limits_of, observed, usage, weights_of
+from runtime.excitation.search import Problem, _search, excite, one_start, smoothed
+from runtime.model.casadi import load_symbolic
+from runtime.model.generated import load_model
+from runtime.observation.observation import observe
+from runtime.records.record import Record
+from runtime.settings.excitation import ExcitationSettings, Sphere
+from runtime.settings.schema import structure
+from runtime.settings.study import Decimate, Lowpass, Signals, Study
+from runtime.settings.trajectories import Motion, Part, motion_from_mapping
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

@@ -12,16 +12,16 @@ from scipy.optimize import minimize
 
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, SettingsError, observe, read_records, study_from_mapping
-from runtime.estimate import Estimate
 from runtime.estimators import estimate
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.feasibility import Ellipsoid, Limits, feasibility, limit_rows, standard_parameters
 from runtime.estimators.feasible import Options, linear, residual_norm, weighed
-from runtime.feasibility import Ellipsoid, Limits, feasibility, limit_rows, standard_parameters
-from runtime.io.datasets import dataset_study
-from runtime.model import load_model
-from runtime.observation import Observation
-from runtime.physical import INERTIAL, negative_elements, physical_model, pseudo_inertia
-from runtime.study import EstimateSettings
-from runtime.validation import split_validation
+from runtime.estimators.physical import INERTIAL, negative_elements, physical_model, pseudo_inertia
+from runtime.identification.validation import split_validation
+from runtime.model.generated import load_model
+from runtime.observation.observation import Observation
+from runtime.records.datasets import dataset_study
+from runtime.settings.study import EstimateSettings
 from symgen.description import load_robot
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"

@@ -16,8 +16,8 @@ import scipy.io
 from bag_files import joint_states, write_bag
 
 from runtime import load_model, observe, read_records, study_from_mapping
-from runtime.essential import essential
-from runtime.io.datasets import dataset_study, fetch
+from runtime.estimators.essential import essential
+from runtime.records.datasets import dataset_study, fetch
 
 FORMATS = ("csv", "csv.gz", "parquet", "mat 5", "mat 7", "mat 7.3", "npz", "npy", "ros1", "sqlite3", "mcap", "bare mcap")
 JOINTS = [f"joint_{j}" for j in range(1, 7)]

@@ -9,13 +9,13 @@ import pytest
 
 from runtime import InputError, Record, observe, read_records, study_from_mapping
 from runtime.estimators import estimate
-from runtime.friction import friction_curves, own_friction
-from runtime.friction_laws import correlation_time
-from runtime.io.datasets import dataset_study
-from runtime.model import load_model
-from runtime.report import plots
-from runtime.report.friction import friction_figure, friction_section
-from runtime.report.html import Page, render
+from runtime.identification.friction import friction_curves, own_friction
+from runtime.identification.friction_laws import correlation_time
+from runtime.model.generated import load_model
+from runtime.records.datasets import dataset_study
+from runtime.reporting import figures as plots
+from runtime.reporting.friction import friction_figure, friction_section
+from runtime.reporting.page import Page, render
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0

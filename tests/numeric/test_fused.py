@@ -13,16 +13,17 @@ from scipy.signal import cheby1, sosfiltfilt
 
 from oracles.random_robots import random_robot
 from runtime.errors import InputError
+from runtime.estimators.reductions import normal_equations, triangular_factor
 from runtime.estimators.solution import solve
-from runtime.reductions import normal_equations, triangular_factor
-from runtime.signals import filtered_states, kept_samples
-from runtime.studies import fused, fused_reductions
-from runtime.studies.compile_cache import NotCompiledError, cache_folder
-from runtime.studies.compiled import CompiledModel
-from runtime.studies.fused import Entries, FilteredStates, Room, constant_values, decimated
-from runtime.studies.fused_check import unavailable
-from runtime.studies.fused_reductions import KeptRows
-from runtime.study import Decimate, Lowpass, Signals
+from runtime.model.compile_cache import NotCompiledError, cache_folder
+from runtime.model.compiled import CompiledModel
+from runtime.observation.filters import filtered_states, kept_samples
+from runtime.resolution.c import kernels as fused
+from runtime.resolution.c import least_squares as fused_reductions
+from runtime.resolution.c.kernels import Entries, FilteredStates, Room, constant_values, decimated
+from runtime.resolution.c.least_squares import KeptRows
+from runtime.resolution.c.self_test import unavailable
+from runtime.settings.study import Decimate, Lowpass, Signals
 from symgen.description import load_robot
 
 pytestmark = needs_compiler

@@ -10,21 +10,21 @@ from fused_data import in_c, needs_compiler, own_cache
 from scipy.signal import decimate
 
 from oracles.random_robots import random_robot
-from runtime.cestac import cestac
-from runtime.cestac_run import perturbed_position
-from runtime.drives import Drives
 from runtime.errors import InputError, ModelError
-from runtime.io.datasets import dataset_study
-from runtime.io.records import read_records
-from runtime.model_text import ModelText
-from runtime.observation import decimated_torque, select_rows
-from runtime.record import Record
-from runtime.runs import NORMAL, TRIANGULAR
-from runtime.signals import filtered_states
-from runtime.studies import fused_cestac
-from runtime.studies.compile_cache import FallbackWarning, cache_folder
-from runtime.studies.compiled import CompiledModel
-from runtime.study import CestacSettings, Decimate, EstimateSettings, Lowpass, Rows, Signals, Study, study_from_mapping
+from runtime.model.compile_cache import FallbackWarning, cache_folder
+from runtime.model.compiled import CompiledModel
+from runtime.model.drives import Drives
+from runtime.model.text import ModelText
+from runtime.observation.filters import filtered_states
+from runtime.observation.observation import decimated_torque, select_rows
+from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
+from runtime.records.record import Record
+from runtime.resolution.c import cestac_run as fused_cestac
+from runtime.resolution.cestac import cestac
+from runtime.resolution.run import perturbed_position
+from runtime.resolution.runs import NORMAL, TRIANGULAR
+from runtime.settings.study import CestacSettings, Decimate, EstimateSettings, Lowpass, Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
 
 pytestmark = needs_compiler

@@ -19,7 +19,7 @@ from rosbags.typesys import get_types_from_msg
 
 from runtime import read_record, study_from_mapping
 from runtime.errors import InputError
-from runtime.io.bags import read_bag
+from runtime.records.formats.bags import read_bag
 
 ALWAYS = 2**24  # bytes that any file may unpack to, here
 BEYOND = ALWAYS + 2**20
@@ -31,7 +31,7 @@ MESSAGES = {"/joint_states": joint_states(STAMPS, ("j1", "j2"), np.zeros((N, 2))
 @pytest.fixture(autouse=True)
 def smaller(monkeypatch):
     """The limit of 256 MiB takes seconds to reach."""
-    monkeypatch.setattr("runtime.io.limits.ALWAYS", ALWAYS)
+    monkeypatch.setattr("runtime.limits.ALWAYS", ALWAYS)
 
 
 def refused(read, said, peak=60e6):

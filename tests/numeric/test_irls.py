@@ -9,14 +9,14 @@ from planar_data import OLS, TRUE, observation
 from scipy.optimize import least_squares
 
 from runtime.errors import SettingsError
-from runtime.estimate import Estimate
 from runtime.estimators import estimate
+from runtime.estimators.estimate import Estimate
 from runtime.estimators.irls import slope, weight
-from runtime.io.datasets import dataset_study
-from runtime.io.records import read_records
-from runtime.model import load_model
-from runtime.observation import observe
-from runtime.study import EstimateSettings, study_from_mapping
+from runtime.model.generated import load_model
+from runtime.observation.observation import observe
+from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
+from runtime.settings.study import EstimateSettings, study_from_mapping
 
 HUBER = EstimateSettings(method="irls")
 TUKEY = EstimateSettings(method="irls", options={"loss": "tukey"})

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from runtime.errors import InputError
-from runtime.io.mat import read_mat
+from runtime.records.formats.mat import read_mat
 
 T = np.arange(12) / 200
 Q = np.stack([np.sin(T), np.cos(T)], axis=1)
@@ -134,7 +134,7 @@ def test_links_are_not_followed(tmp_path):
 
 def test_bombs_are_refused(monkeypatch):
     """Of more than the limit from a few kilobytes: an array that is declared and never stored, and a compressed element."""
-    monkeypatch.setattr("runtime.io.limits.ALWAYS", 2**24)
+    monkeypatch.setattr("runtime.limits.ALWAYS", 2**24)
     declared = file_73(lambda archive: archive.create_dataset("q", (10**12, 6), "f8", chunks=(1000, 6), compression="gzip"))
     packed = zlib.compress(bytes(2**24 + 2**20), 9)
     head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"

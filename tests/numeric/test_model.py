@@ -10,8 +10,8 @@ import pytest
 
 from runtime import load_model
 from runtime.errors import ModelError
-from runtime.model import check_states, require
-from runtime.model_source import check_source
+from runtime.model.generated import check_states, require
+from runtime.model.loading import check_source
 
 HERE = Path(__file__).parent
 EMITTED = HERE.parents[1] / "generated"

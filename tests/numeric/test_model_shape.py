@@ -13,7 +13,7 @@ import pytest
 
 from runtime import load_model
 from runtime.errors import ModelError
-from runtime.model_shape import MOST_WORDS, check_source
+from runtime.model.source_check import MOST_WORDS, check_source
 
 EMITTED = Path(__file__).parents[2] / "generated"
 HEADS = {
@@ -247,7 +247,7 @@ BOMBS = {
 CODE = """
 import json, sys, time
 from runtime.errors import ModelError
-from runtime.model_shape import check_source
+from runtime.model.source_check import check_source
 def peak():  # kB; getrusage would tell that of the process that started this one
     return next(int(line.split()[1]) for line in open('/proc/self/status') if line.startswith('VmHWM'))
 for name, text in json.load(sys.stdin).items():

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from runtime.errors import InputError
-from runtime.estimators.normal import LIMIT, least_squares, normal, triangular
+from runtime.estimators.normal_equations import LIMIT, least_squares, normal, triangular
+from runtime.estimators.reductions import JointRows, joint_columns, normal_equations, triangular_factor
 from runtime.estimators.solution import solve
-from runtime.model import load_model
-from runtime.reductions import JointRows, joint_columns, normal_equations, triangular_factor
+from runtime.model.generated import load_model
 
 N = 2003  # no multiple of a block
 

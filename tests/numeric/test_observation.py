@@ -13,11 +13,11 @@ import scipy.signal
 from planar_data import TRUE, motion
 
 from runtime import Record, load_model, observe, stack, study_from_mapping
-from runtime.columns import decimated_columns, distinct_entries, signals_of
 from runtime.errors import InputError
-from runtime.observation import decimated_torque, observation_from_states, select_rows
-from runtime.signals import States, decimated, filtered_states
-from runtime.study import Decimate
+from runtime.observation.filters import States, decimated, filtered_states
+from runtime.observation.observation import decimated_torque, observation_from_states, select_rows
+from runtime.observation.regressor_signals import decimated_columns, distinct_entries, signals_of
+from runtime.settings.study import Decimate
 
 RATE, N = 1000.0, 6000
 T = np.arange(N) / RATE

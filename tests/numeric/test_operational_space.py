@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from runtime.errors import InputError
-from runtime.estimate import Estimate
-from runtime.model import load_model
-from runtime.operational_space import operational_space
+from runtime.estimators.estimate import Estimate
+from runtime.identification.operational_space import operational_space
+from runtime.model.generated import load_model
 from symgen.description import load_robot
 from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, Frame

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from runtime import InputError, Record, SettingsError, observe, study_from_mapping
-from runtime.drive_gains import drive_gains
 from runtime.estimators import estimate
-from runtime.model import load_model
-from runtime.payload import payload, payload_difference
-from runtime.physical import INERTIAL, physical_model
-from runtime.study import EstimateSettings, PayloadSettings
+from runtime.estimators.physical import INERTIAL, physical_model
+from runtime.identification.drive_gains import drive_gains
+from runtime.identification.payload import payload, payload_difference
+from runtime.model.generated import load_model
+from runtime.settings.study import EstimateSettings, PayloadSettings
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from runtime.errors import InputError
-from runtime.processes import BLAS_THREADS, results
+from runtime.parallel import BLAS_THREADS, results
 
 
 def threads(context, key):
@@ -48,7 +48,7 @@ def test_processes_that_always_die():
 
 def test_processes_end_with_the_one_that_started_them(tmp_path):
     """Killed, it cannot tell them to."""
-    code = "from runtime.processes import results\nimport sys, time, test_processes\nif __name__ == '__main__':\n" \
+    code = "from runtime.parallel import results\nimport sys, time, test_processes\nif __name__ == '__main__':\n" \
            "    for pid in results(test_processes.waiting, None, [0.0, 60.0], 1):\n        print(pid, flush=True)\n"  # fmt: skip
     script = tmp_path / "script.py"
     script.write_text(code)

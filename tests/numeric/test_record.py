@@ -9,8 +9,8 @@ import scipy.io
 
 from runtime import Drives, Record, read_record, read_records
 from runtime.errors import InputError, SettingsError
-from runtime.io.streams import open_stream
-from runtime.study import RecordSettings, study_from_mapping
+from runtime.records.reading_by_blocks import open_stream
+from runtime.settings.study import RecordSettings, study_from_mapping
 
 N, RATE = 60, 200.0
 T = np.arange(N) / RATE

@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.advice import AGREED, crossing, sampled
-from runtime.bandwidth import bandwidth
 from runtime.errors import InputError, ModelError, SettingsError
-from runtime.io.datasets import dataset_study
-from runtime.io.records import read_records
-from runtime.model import load_model
-from runtime.observation import decimated_torque, observe
-from runtime.perturbation import encoder_root, perturbation
-from runtime.report.advice import advice_section
-from runtime.resolution import ALL, Predictor, advise, torque_sigma
-from runtime.signals import decimated, filtered_states
-from runtime.study import Decimate, Lowpass, Signals, study_from_mapping
-from runtime.switching import Switch, kernels, switched, switches
+from runtime.model.generated import load_model
+from runtime.observation.filters import decimated, filtered_states
+from runtime.observation.noise_gain import bandwidth
+from runtime.observation.observation import decimated_torque, observe
+from runtime.observation.position_errors import encoder_root, perturbation
+from runtime.observation.sign_errors import Switch, kernels, switched, switches
+from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
+from runtime.reporting.resolution_advice import advice_section
+from runtime.resolution.advice import AGREED, crossing, sampled
+from runtime.resolution.advisor import ALL, Predictor, advise, torque_sigma
+from runtime.settings.study import Decimate, Lowpass, Signals, study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 TX40_COLUMNS = (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from runtime.rounding import rounded, signs, stream
+from runtime.resolution.rounding import rounded, signs, stream
 
 STEP = 0.02
 

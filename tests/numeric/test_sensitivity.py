@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from runtime import load_model
-from runtime.controller_settings import Controller
-from runtime.mapping import structure
-from runtime.reference import Reference, reference_of
-from runtime.studies.simulation import Simulator, parameters_of
+from runtime.motion.reference import Reference, reference_of
+from runtime.motion.simulation import Simulator, parameters_of
+from runtime.settings.controller import Controller
+from runtime.settings.schema import structure
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 X = np.array([95.0, 203.0, 20.0, -3.0])

@@ -5,8 +5,16 @@ import pytest
 import scipy.signal
 
 from runtime.errors import InputError
-from runtime.signals import decimated, decimation_factor, derivative, filtered_states, kept_samples, lowpass_filtered, median_filtered
-from runtime.study import Decimate, Lowpass, Signals
+from runtime.observation.filters import (
+    decimated,
+    decimation_factor,
+    derivative,
+    filtered_states,
+    kept_samples,
+    lowpass_filtered,
+    median_filtered,
+)
+from runtime.settings.study import Decimate, Lowpass, Signals
 
 RATE = 1000.0
 T = np.arange(3000) / RATE

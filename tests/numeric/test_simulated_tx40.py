@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from runtime.estimators import estimate
-from runtime.model import load_model
-from runtime.observation import decimated_torque, observation_from_states
-from runtime.record import Record
-from runtime.rows import select_rows
-from runtime.signals import States
-from runtime.study import EstimateSettings, study_from_mapping
+from runtime.model.generated import load_model
+from runtime.observation.filters import States
+from runtime.observation.observation import decimated_torque, observation_from_states
+from runtime.observation.rows import select_rows
+from runtime.records.record import Record
+from runtime.settings.study import EstimateSettings, study_from_mapping
 
 RATE, N, RUNS = 500.0, 4000, 200
 NOISE = np.array([3.0, 3.0, 2.0, 0.8, 0.8, 0.5])  # N m, of each joint

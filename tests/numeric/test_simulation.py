@@ -10,17 +10,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from runtime import InputError, SettingsError, load_model, read_records, study_from_mapping
-from runtime.control_law import control_law, discrete_poles
-from runtime.controller_settings import Controller
-from runtime.io.datasets import dataset_study
-from runtime.mapping import structure
-from runtime.reference import Reference, reference_of
-from runtime.signals import filtered_states
-from runtime.simulation_result import SimulationError
-from runtime.studies.simulation import Simulator, inertia_ratio, parameters_of, simulate
-from runtime.studies.simulation_friction import dry_friction, friction_function
-from runtime.studies.simulation_loop import plant_function
-from runtime.symbolic_model import load_symbolic
+from runtime.model.casadi import load_symbolic
+from runtime.motion.control_law import control_law, discrete_poles
+from runtime.motion.controller_tick import plant_function
+from runtime.motion.dry_friction import dry_friction, friction_function
+from runtime.motion.reference import Reference, reference_of
+from runtime.motion.result import SimulationError
+from runtime.motion.simulation import Simulator, inertia_ratio, parameters_of, simulate
+from runtime.observation.filters import filtered_states
+from runtime.records.datasets import dataset_study
+from runtime.settings.controller import Controller
+from runtime.settings.schema import structure
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 GTAU = 35.15065188248547  # N/V
@@ -238,8 +238,8 @@ def test_motor_encoder_saturation_and_seeds(tx40, truth):
 
 
 def test_record_and_csv_carry_the_reference(tx40, truth, tmp_path):
-    from runtime.io.records import read_record
-    from runtime.study import RecordSettings
+    from runtime.records.reading import read_record
+    from runtime.settings.study import RecordSettings
 
     settings = controller(record_every=5, reference={"points": {"duration": 0.4}})
     reference = reference_of(settings, tx40)

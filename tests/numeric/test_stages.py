@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from runtime.decimation import decimate, plan
 from runtime.errors import InputError
-from runtime.signals import butterworth, derivative, lowpass_filtered, median_filtered
-from runtime.stages import (
+from runtime.observation.decimation import decimate, plan
+from runtime.observation.filters import butterworth, derivative, lowpass_filtered, median_filtered
+from runtime.observation.streaming_filters import (
     TRUNCATION,
     Chain,
     Local,
@@ -18,7 +18,7 @@ from runtime.stages import (
     position_stage,
     velocity_stage,
 )
-from runtime.study import Lowpass, Signals
+from runtime.settings.study import Lowpass, Signals
 
 
 def walk(N, columns, offset=10.0):

@@ -11,7 +11,7 @@ import pytest
 from oracles.pinocchio_model import PinocchioModel
 from runtime import Record, observe, study_from_mapping
 from runtime.estimators import estimate
-from runtime.model import load_model
+from runtime.model.generated import load_model
 from symgen.description import load_robot
 from symgen.emit import generate_module
 

@@ -12,15 +12,15 @@ import pytest
 
 from runtime import Drives, load_model, observe, read_record, read_records, study_from_mapping
 from runtime.errors import InputError, SettingsError
-from runtime.essential import essential
 from runtime.estimators import estimate
-from runtime.io.datasets import dataset_study
-from runtime.io.streams import are_large, open_stream
-from runtime.observation import stack
-from runtime.record_stream import RecordStream
-from runtime.streaming import halves, reduce_records
-from runtime.study import EstimateSettings, RecordSettings
-from runtime.validation import cross_validation, split_validation, weak_directions
+from runtime.estimators.essential import essential
+from runtime.identification.validation import cross_validation, split_validation, weak_directions
+from runtime.observation.by_blocks import halves, reduce_records
+from runtime.observation.observation import stack
+from runtime.records.datasets import dataset_study
+from runtime.records.reading_by_blocks import are_large, open_stream
+from runtime.records.stream import RecordStream
+from runtime.settings.study import EstimateSettings, RecordSettings
 
 N, RATE = 1003, 500.0
 DRIVES = Drives([[30.0, 0.0], [12.0, -20.0]], [0.1, -0.2], [0.5, 0.4])
@@ -94,7 +94,7 @@ def test_two_files_and_a_rate(tmp_path, samples):
 
 def test_time_of_long_records_is_not_kept(tmp_path, samples, monkeypatch):
     stream = open_stream(settings(write("npz", tmp_path, samples)), folder=tmp_path, block=100)
-    monkeypatch.setattr("runtime.io.streams.KEPT", 1000)
+    monkeypatch.setattr("runtime.records.reading_by_blocks.KEPT", 1000)
     for _ in range(2):
         np.testing.assert_array_equal(np.concatenate(list(stream.times())), samples[0])
     assert "_clock" not in vars(stream)
@@ -172,7 +172,7 @@ def test_parquet_without_its_library(tmp_path, samples, monkeypatch):
 def test_large_files(tmp_path, monkeypatch, samples):
     given = settings(write("npz", tmp_path, samples))
     assert not are_large([given], tmp_path)
-    monkeypatch.setattr("runtime.io.streams.LARGE", 10_000)
+    monkeypatch.setattr("runtime.records.reading_by_blocks.LARGE", 10_000)
     assert are_large([given], tmp_path)
     assert not are_large([settings({"dataset": "tx40", "files": ["pos_read_data.csv"]})])
     assert not are_large([RecordSettings(files=("record.mat",))], tmp_path)

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from runtime.arithmetic import number
 from runtime.errors import InputError, SettingsError
-from runtime.io.datasets import DATASETS, dataset_study
-from runtime.io.study_files import load_study, study_from_text, study_of
-from runtime.study import Study, study_from_mapping, to_mapping
+from runtime.records.datasets import DATASETS, dataset_study
+from runtime.settings.arithmetic import number
+from runtime.settings.files import load_study, study_from_text, study_of
+from runtime.settings.study import Study, study_from_mapping, to_mapping
 
 DESIGN = """
 symgen: 1

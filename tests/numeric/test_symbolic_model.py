@@ -7,8 +7,8 @@ import pytest
 
 from runtime import load_model
 from runtime.errors import ModelError
-from runtime.model_source import check_source
-from runtime.symbolic_model import load_symbolic
+from runtime.model.casadi import load_symbolic
+from runtime.model.loading import check_source
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 HEAD = '"""A model."""\nimport casadi as ca\n'

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from runtime import observe, read_record, read_records, study_from_mapping
 from runtime.errors import InputError
-from runtime.identification import coupling_fits
-from runtime.io.streams import are_large, open_stream, records_or_streams
-from runtime.record import Record
-from runtime.resampling import resampled
-from runtime.study import Resample
-from runtime.time_stamps import time_stamps
+from runtime.identification.identification import coupling_fits
+from runtime.records.reading_by_blocks import are_large, open_stream, records_or_streams
+from runtime.records.record import Record
+from runtime.records.resampling import resampled
+from runtime.records.time_stamps import time_stamps
+from runtime.settings.study import Resample
 
 RATE = 500.0
 T = np.arange(2000) / RATE
@@ -209,7 +209,7 @@ def test_streams_refuse_to_resample(tmp_path, monkeypatch):
     asked = study(resample={})
     with pytest.raises(InputError, match=r"record\.resample needs the whole record; set stream: off"):
         open_stream(asked.record[0], folder=tmp_path)
-    monkeypatch.setattr("runtime.io.streams.LARGE", 10)
+    monkeypatch.setattr("runtime.records.reading_by_blocks.LARGE", 10)
     assert not are_large(asked.record, tmp_path) and are_large(study().record, tmp_path)
     assert isinstance(records_or_streams(asked.record, planar, "auto", folder=tmp_path)[0], Record)
 

@@ -10,12 +10,12 @@ from scipy.optimize import minimize
 
 from runtime.errors import SettingsError
 from runtime.estimators import estimate
-from runtime.identification import identification
-from runtime.model import load_model
-from runtime.observation import observe, stack
-from runtime.perturbation import with_errors
-from runtime.record import Record
-from runtime.study import EstimateSettings, Lowpass, Rows, Signals, Study
+from runtime.identification.identification import identification
+from runtime.model.generated import load_model
+from runtime.observation.observation import observe, stack
+from runtime.observation.position_errors import with_errors
+from runtime.records.record import Record
+from runtime.settings.study import EstimateSettings, Lowpass, Rows, Signals, Study
 
 EMPS = load_model(Path(__file__).resolve().parents[2] / "generated" / "emps.py")
 X_EMPS = np.array([95.0, 203.0, 20.0, -3.0])

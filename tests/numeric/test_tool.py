@@ -11,10 +11,10 @@ from test_payload import BOX, emitted, observe, record
 from test_payload import STUDY as PAYLOAD_STUDY
 
 from runtime import InputError, SettingsError, load_model
-from runtime.payload import payload
-from runtime.physical import INERTIAL, physical_model, pseudo_inertia
-from runtime.study import PayloadSettings
-from runtime.tool import load_effect, load_of_body, mount, ten_parameters
+from runtime.estimators.physical import INERTIAL, physical_model, pseudo_inertia
+from runtime.identification.payload import payload
+from runtime.model.mount import load_effect, load_of_body, mount, ten_parameters
+from runtime.settings.study import PayloadSettings
 from symgen.description import load_robot, parse
 from symgen.description.expression import Expression
 from symgen.description.robot import Frame

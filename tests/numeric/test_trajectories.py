@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from runtime.errors import InputError, SettingsError
-from runtime.trajectories import (
+from runtime.settings.trajectories import (
     FAMILIES,
     Fourier,
     Motion,

@@ -9,14 +9,14 @@ from planar_data import OLS, WLS, observation
 from scipy import stats
 from scipy.signal import lfilter
 
-from runtime.essential import essential
-from runtime.estimate import json_text
 from runtime.estimators import estimate
-from runtime.report.trust import trust_section
-from runtime.residuals import effective_share, joint_whiteness
-from runtime.study import EssentialSettings, EstimateSettings
-from runtime.trust import f_tests, scatter, trust
-from runtime.validation import JointComparison, direct_comparison
+from runtime.estimators.essential import essential
+from runtime.estimators.estimate import json_text
+from runtime.identification.residuals import effective_share, joint_whiteness
+from runtime.identification.uncertainty import f_tests, scatter, trust
+from runtime.identification.validation import JointComparison, direct_comparison
+from runtime.reporting.uncertainty import trust_section
+from runtime.settings.study import EssentialSettings, EstimateSettings
 
 
 def coloured(white):

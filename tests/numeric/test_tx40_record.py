@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from runtime import Drives, filtered_states, read_record, study_from_mapping
-from runtime.io.datasets import dataset_study
+from runtime.records.datasets import dataset_study
 
 RATIO = np.diag([32.0, 32, 45, -48, 45, 32])
 RATIO[5, 4] = 32  # motor 6 turns with joint 5 as well

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from runtime import Drives, read_record, study_from_mapping
 from runtime.errors import InputError, SettingsError
-from runtime.io.units import GRAMMAR, SI, TABLE, position_unit, speed, time_unit, torque_unit
+from runtime.settings.units import GRAMMAR, SI, TABLE, position_unit, speed, time_unit, torque_unit
 
 OURS = {"counts", "count", "°", "Nm", "mNm", "rev"}
 

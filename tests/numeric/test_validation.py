@@ -10,8 +10,8 @@ from planar_data import TRUE, motion, observation
 
 from runtime.errors import InputError
 from runtime.estimators import estimate
-from runtime.study import EstimateSettings
-from runtime.validation import cross_validation, direct_comparison, split_validation, weak_directions
+from runtime.identification.validation import cross_validation, direct_comparison, split_validation, weak_directions
+from runtime.settings.study import EstimateSettings
 
 
 def test_comparison_holds_the_torques_of_every_joint():

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from report.strict_html import Strict
 
-from runtime.report.html import Image, Matrix, Number, Page, Section, Table, embedded, render
-from runtime.report.markup import element, formula, symbol
-from runtime.report.series import Series
+from runtime.markup import element, formula, symbol
+from runtime.reporting.page import Image, Matrix, Number, Page, Section, Table, embedded, render
+from runtime.reporting.series import Series
 
 HOSTILE = "</style></script><script>alert('x')</script> & \"<img src=x onerror=alert(1)> {{ 7*7 }} <!-- ]]>"
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from nbclient import NotebookClient
 
-from runtime.cestac_result import Cestac, Level, level_result
-from runtime.estimate import Estimate, JointFit
-from runtime.observation import Observation
-from runtime.runs import Run, Runs
+from runtime.estimators.estimate import Estimate, JointFit
+from runtime.observation.observation import Observation
+from runtime.resolution.result import Cestac, Level, level_result
+from runtime.resolution.runs import Run, Runs
 from symgen.description import load_robot
 from symgen.regroup.regrouping import regroup
 
@@ -110,7 +110,7 @@ def test_a_notebook_shows_them():
     book = nbformat.v4.new_notebook()
     book.cells = [
         nbformat.v4.new_code_cell("import symgen\nsymgen.regroup(symgen.load_robot('planar_2r'))"),
-        nbformat.v4.new_code_cell("from runtime.notebook import symbol\nprint(symbol('ZZ1R'))"),
+        nbformat.v4.new_code_cell("from runtime.reporting.notebook import symbol\nprint(symbol('ZZ1R'))"),
     ]
     NotebookClient(book, timeout=120, kernel_name="python3").execute()
     data = book.cells[0].outputs[0]["data"]

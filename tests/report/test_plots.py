@@ -5,8 +5,8 @@ import sys
 import numpy as np
 import pytest
 
-from runtime.report import plots
-from runtime.validation import Comparison, JointComparison
+from runtime.identification.validation import Comparison, JointComparison
+from runtime.reporting import figures as plots
 
 
 @pytest.fixture

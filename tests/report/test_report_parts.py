@@ -9,17 +9,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from runtime.estimate import Estimate, JointFit
-from runtime.identification import lost_joints
-from runtime.judgement import apart, graded, judge
-from runtime.model import load_model
-from runtime.report.markup import split, symbol, unit
-from runtime.report.parameters import cad_values, roles_of
-from runtime.report.residuals import decimation_cutoff
-from runtime.report.series import extremes, gaps, series
-from runtime.report.weak import correlations
-from runtime.study import Decimate, Signals
-from runtime.validation import JointComparison
+from runtime.estimators.estimate import Estimate, JointFit
+from runtime.identification.checklist import apart, graded, judge
+from runtime.identification.identification import lost_joints
+from runtime.identification.validation import JointComparison
+from runtime.markup import split, symbol, unit
+from runtime.model.generated import load_model
+from runtime.reporting.correlations import correlations
+from runtime.reporting.parameters import cad_values, roles_of
+from runtime.reporting.residuals import decimation_cutoff
+from runtime.reporting.series import extremes, gaps, series
+from runtime.settings.study import Decimate, Signals
 from symgen.report.symbols import symbol as other_symbol
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"

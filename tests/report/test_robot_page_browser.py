@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from browser import WEAK_CONTRAST
 
-from runtime.model import load_model
+from runtime.model.generated import load_model
 from symgen.description import load_robot
 from symgen.regroup.regrouping import regroup
 from symgen.report.page import robot_page

@@ -1,0 +1,258 @@
+"""The closed loop in which a record was made, run again with other parameters: what IV, DIDIM and CLOE compare the record with.
+
+    loop = closed_loop(model, records, study, simulator)
+    seen = loop.measured()                Y = W X + rho, to which the loop stays attached
+    runs = loop.run(X, g)                 one simulation per record, exact states, no noise, no steps
+    loop.instruments(runs, seen)          Z = F_p[W(q_s, ...)], q_s through the filters of the record                   IDIM-IV
+    loop.motion(runs, seen)               Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the decimation alone       DIDIM
+
+g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies all that stands between position error and torque: the bandwidth
+of the simulated loop stays that of the real one while X^k is far from the truth. Rows are chosen by the velocity of the reference, never by that
+of the measured positions: a choice that depends on noise biases every method. Slow rows of joint j (`rows.low_speed`) are those where a dry friction
+that acts on it, coupled ones of a wrist included, slips slower: at rest its torque is anything between -FS and FS, not W X, and the decimation smears
+that into the rows `around` (a noise-free record of the TX40 with stops: Ia5 9 % off; rows within 0.1 s left out: 0.1 %). Instants with the torque at
+its limit are left out.
+
+Where the reference is not known (`reference: measured`), the measured motion through the filters stands for it: then the instruments carry the
+noise of the same run, and DIDIM is output error about itself. The Estimate says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.ndimage import minimum_filter1d
+
+from runtime.errors import InputError, SettingsError
+from runtime.model.generated import GeneratedModel
+from runtime.motion.reference import Reference, reference_of
+from runtime.observation.filters import States, decimated, filtered_states
+from runtime.observation.observation import LoopRows, Observation, decimated_torque, observation_from_states, stack
+from runtime.observation.rows import Selection, select_rows
+from runtime.records.record import Record
+from runtime.settings.controller import Controller
+from runtime.settings.study import Study
+
+Array = np.ndarray
+
+CLIPPED = 0.98  # of the largest torque: instants above it are left out
+ASSUMED = (
+    "The reference of this record is not known; the measured motion through the filters stands for it. Instruments then carry the noise of the same run, "
+    "and a simulated motion is compared with itself: bias is removed only as far as the noise does not pass the loop."
+)
+
+
+class Run(Protocol):
+    """What is used of a simulation: arrays of shape (N, n) at the recorded ticks."""
+
+    @property
+    def q(self) -> Array:
+        """Position."""
+
+    @property
+    def qd(self) -> Array:
+        """Velocity."""
+
+    @property
+    def qdd(self) -> Array:
+        """Acceleration."""
+
+    @property
+    def tau(self) -> Array:
+        """Torque of the drives."""
+
+
+class Simulator(Protocol):
+    """What is used of `runtime.motion.simulation.Simulator`."""
+
+    controller: Controller
+    law: Any
+    friction: Any
+
+    def run(self, X: Array, reference: Reference, *, g: Array | float, start: Array, ideal: bool) -> Run:
+        """One run; raises InputError where it cannot be made."""
+
+    def sensitivity(self, X: Array, reference: Reference, *, start: Array) -> tuple[Run, Any]:
+        """An ideal run, and its derivatives by X, arrays q and tau of shape (N, n, b)."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopPart:
+    """One record: what the controller followed, at its rate, the rows used, and Y before rows are left out, shape (n, K)."""
+
+    record: Record
+    reference: Reference
+    selection: Selection
+    torque: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """The records with their loop. `assumption`: what was assumed about the reference; empty where it is known."""
+
+    model: GeneratedModel
+    study: Study
+    simulator: Simulator
+    parts: tuple[LoopPart, ...]
+    assumption: str = ""
+
+    def run(self, X: Array, g: Array | float = 1.0) -> list[Run]:
+        """One simulation per record with all base parameters X (b,), from the measured position at its start, at rest."""
+        return [self.simulator.run(X, part.reference, g=g, start=part.record.q[0], ideal=True) for part in self.parts]
+
+    def measured(self) -> Observation:
+        """Y = W X + rho of the measured positions on the rows of the loop, which it carries along."""
+        seen = self._observed([filtered_states(p.record.q, p.record.rate, p.selection.signals) for p in self.parts])
+        return replace(seen, closed_loop=LoopRows(self, np.arange(len(seen.Y))))
+
+    def instruments(self, runs: Sequence[Run], seen: Observation) -> Observation:
+        """The rows and columns of `seen` with Z of the simulated positions, through the filters of the record, in place of W."""
+        pairs = zip(runs, self.parts, strict=True)
+        return self._like(seen, [filtered_states(run.q[: len(p.record)], p.record.rate, p.selection.signals) for run, p in pairs])
+
+    def motion(self, runs: Sequence[Run], seen: Observation) -> Observation:
+        """The rows and columns of `seen` with Z of the exact simulated states in place of W."""
+        sizes = [len(part.record) for part in self.parts]
+        return self._like(seen, [States(run.q[:N], run.qd[:N], run.qdd[:N]) for run, N in zip(runs, sizes, strict=True)])
+
+    def sensitivity(self, X: Array) -> list[tuple[Run, Any]]:
+        """One simulation per record, with its derivatives by X."""
+        return [self.simulator.sensitivity(X, part.reference, start=part.record.q[0]) for part in self.parts]
+
+    def outputs(self, signals: Sequence[Array], seen: Observation) -> Array:
+        """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of `seen`: shape (r,) or (r, c)."""
+        assert seen.closed_loop is not None
+        by_joint: list[Array] = []
+        kept = [self._decimated(x, part) for x, part in zip(signals, self.parts, strict=True)]
+        for j in range(len(self.model.JOINTS)):
+            by_joint += [x[j][..., part.selection.mask[j]].T for x, part in zip(kept, self.parts, strict=True)]
+        return np.asarray(np.concatenate(by_joint)[seen.closed_loop.rows])
+
+    def _decimated(self, x: Array, part: LoopPart) -> Array:
+        """(N, n, ...) to (n, ..., K)."""
+        chosen = np.moveaxis(x[: len(part.record)][part.selection.samples], 0, -1)
+        return decimated(np.ascontiguousarray(chosen), part.selection.factor, part.selection.signals.decimate)
+
+    def inertia(self, X: Array) -> Array:
+        """J_j, shape (n,): mean of A_jj over the references."""
+        functions: Any = self.model
+        q = np.concatenate([part.reference.q[:: max(1, len(part.reference) // 500)] for part in self.parts])
+        return np.asarray(np.einsum("tjj->j", functions.inertia_matrix(q, X)) / len(q))
+
+    def _like(self, seen: Observation, states: Sequence[States]) -> Observation:
+        assert seen.closed_loop is not None
+        Z = self._observed(states).columns(seen.names).W
+        return replace(seen, W=np.asfortranarray(Z[seen.closed_loop.rows]))
+
+    def _observed(self, states: Sequence[States]) -> Observation:
+        seen = [
+            observation_from_states(self.model, s, part.torque, part.selection, files=part.record.files)
+            for s, part in zip(states, self.parts, strict=True)
+        ]
+        return seen[0] if len(seen) == 1 else stack(seen)
+
+
+def closed_loop(
+    model: GeneratedModel,
+    records: Sequence[Record],
+    study: Study,
+    simulator: Simulator,
+    *,
+    reference: str = "known",
+    around: float = 0.0,
+    keep: Sequence[Array] = (),
+) -> ClosedLoop:
+    """The loop of a study with a section `controller`.
+
+    reference : "known" (that of the settings, or the columns qr1 ... of each record), or "measured".
+    around : s; rows so near to slow ones (`rows.low_speed`) are left out too.
+    keep : bool, shape (N,) or (N, n) per record: samples that may be used.
+    """
+    if reference not in ("known", "measured"):
+        raise SettingsError(f"{reference!r}; expected known or measured", path=("estimate", "options", "reference"))
+    if not around >= 0:
+        raise SettingsError(f"{around} s; expected 0 or more", path=("estimate", "options", "around"))
+    controller = simulator.controller
+    parts = []
+    for k, record in enumerate(records):
+        rate = controller.rate / controller.record_every
+        if abs(record.rate / rate - 1) > 1e-3:
+            raise SettingsError(f"{record.name} at {record.rate:g} Hz, recorded every {controller.record_every} ticks of {controller.rate:g} Hz; expected the same",
+                                path=("controller", "rate"))  # fmt: skip
+        followed = _reference(model, records, k, controller, study, reference)
+        every = controller.record_every
+        if len(followed) // every + (len(followed) % every > 0) < len(record):
+            raise InputError(
+                f"the reference ends after {len(followed) / controller.rate:g} s, the record after {record.t[-1] - record.t[0]:g} s",
+                file=record.name,
+            )
+        wanted = slowest(slips(followed.qd[::every][: len(record)], simulator.friction.G), round(around * rate))
+        selection = select_rows(
+            record, wanted, study.signals, study.rows, keep=_usable(simulator, record, keep[k] if k < len(keep) else None)
+        )
+        parts.append(LoopPart(record, followed, selection, decimated_torque(record.tau, selection)))
+    return ClosedLoop(model, study, simulator, tuple(parts), ASSUMED if reference == "measured" else "")
+
+
+def _reference(model: GeneratedModel, records: Sequence[Record], k: int, controller: Controller, study: Study, reference: str) -> Reference:
+    """What the controller followed in record k, at its rate."""
+    record = records[k]
+    if reference == "measured":
+        states = filtered_states(record.q, record.rate, study.signals)
+        if controller.record_every == 1:
+            return Reference(controller.rate, states.q, states.qd, states.qdd)
+        ticks = np.arange((len(record) - 1) * controller.record_every + 1) / controller.record_every
+        each = [np.column_stack([np.interp(ticks, np.arange(len(x)), column) for column in x.T]) for x in (states.q, states.qd, states.qdd)]
+        return Reference(controller.rate, *each)
+    if record.q_r is not None and controller.record_every == 1:
+        return Reference.sampled(record.q_r, controller.rate)
+    given = controller.reference
+    if all(getattr(given, name) is None for name in ("file", "motion", "points", "record")):
+        raise SettingsError(
+            f"what the controller followed in {record.name} is not known; give columns qr1 ... (record.columns.qr) or controller.reference, or say "
+            "estimate.options.reference: measured",
+            path=("controller", "reference"),
+        )
+    if len(records) > 1 and given.record is None:
+        raise SettingsError(
+            f"one reference for {len(records)} records; give each record its columns qr1 ...", path=("controller", "reference")
+        )
+    return reference_of(replace(controller, reference=replace(given, limits="ignore")), model, records=records)
+
+
+def slips(qd: Array, G: Array) -> Array:
+    """Smallest speed of what rubs on each joint, its own included, shape (N, n).   qd : (N, n).   G : (elements, n), slips G qd of dry friction."""
+    speed: Array = np.abs(qd)
+    for element in G:
+        acts = np.flatnonzero(element)
+        speed[:, acts] = np.minimum(speed[:, acts], np.abs(qd @ element)[:, None])
+    return speed
+
+
+def slowest(speed: Array, samples: int) -> Array:
+    """Smallest of each column of speed, (N, n), so many samples before and after."""
+    return speed if samples == 0 else np.asarray(minimum_filter1d(speed, 2 * samples + 1, axis=0, mode="nearest"))
+
+
+def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:
+    """`keep`, and the samples whose torque is not at its limit."""
+    bound = np.broadcast_to(np.asarray(simulator.law.saturation, dtype=float), (record.n,))
+    if not np.isfinite(bound).any():
+        return keep
+    free: Array = np.abs(record.tau) <= CLIPPED * bound
+    return free if keep is None else free & (keep if keep.ndim == 2 else keep[:, None])
+
+
+def loop_of(observation: Observation, method: str) -> ClosedLoop:
+    """The loop of an observation; raises SettingsError where `method` was asked for and there is none."""
+    if observation.closed_loop is None:
+        raise SettingsError(
+            f"{method} simulates the closed loop of the record, and this study tells none; give a section `controller` with law, rate and reference "
+            "(symgen identify then makes it), or use ols, wls, irls or tls",
+            path=("estimate", "method"),
+        )
+    loop: ClosedLoop = observation.closed_loop.loop
+    return loop

@@ -1,0 +1,154 @@
+"""Essential parameters: the few that carry the model (chapter 4.1.1).
+
+The parameter of largest %sigma, eq. (11), is removed and the rest fitted again, as long as sigma_rho, eq. (9), stays below threshold times its
+first value. Removing column k deletes a column of the triangular factor and makes its trailing block triangular again; W is not touched. The
+same trail, followed to its end, gives the count for every other threshold. With weights, the weights of the first fit stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from runtime.estimators import linear_system
+from runtime.estimators.estimate import Estimate, aligned, json_text
+from runtime.estimators.linear import System, assemble, standard_deviations
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.observation.reduction import Reduction
+from runtime.settings.study import EssentialSettings, EstimateSettings
+
+THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
+"""Thresholds whose counts are reported beside the one used."""
+
+
+@dataclass(frozen=True)
+class Removal:
+    """One step: `name` had the largest %sigma (in %); without it sigma_rho is `ratio` times the first one; `removed` tells if it went."""
+
+    name: str
+    relative_sigma: float
+    ratio: float
+    removed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Essential:
+    """The essential parameters and how they were found.
+
+    names : kept, in column order.   estimate : fit with these alone.   all_parameters : the first fit.
+    trail : one Removal per step, the last one being the first refused (or the last parameter); further : the next steps, up to the largest threshold.
+    counts : number of parameters kept, by threshold.
+    """
+
+    names: tuple[str, ...]
+    estimate: Estimate
+    all_parameters: Estimate
+    trail: tuple[Removal, ...]
+    threshold: float
+    counts: Mapping[float, int]
+    further: tuple[Removal, ...] = ()
+
+    def __str__(self) -> str:
+        return self.to_table()
+
+    @property
+    def removed(self) -> tuple[str, ...]:
+        """Names removed, in order."""
+        return tuple(step.name for step in self.trail if step.removed)
+
+    def to_table(self) -> str:
+        """The trail, then the counts by threshold."""
+        first = len(self.all_parameters.names)
+        lines: list[Sequence[str]] = [("removed", "left", "%sigma", "sigma_rho ratio")]
+        for k, step in enumerate(self.trail):
+            name = step.name if step.removed else f"{step.name} (kept)"
+            lines.append((name, str(first - k - step.removed), f"{step.relative_sigma:.3f}", f"{step.ratio:.5f}"))
+        counts = ", ".join(f"{threshold:.2f}: {count}" for threshold, count in self.counts.items())
+        return f"{len(self.names)} of {first} parameters at threshold {self.threshold}\n\n{aligned(lines)}\n\nparameters kept by threshold  {counts}"
+
+    def to_json(self) -> str:
+        """JSON text: names, threshold, trail, counts by threshold."""
+        return json_text(self.summary())
+
+    def summary(self) -> dict[str, Any]:
+        """What `to_json` writes, as a mapping."""
+        return {
+            "schema": 1,
+            "names": self.names,
+            "threshold": self.threshold,
+            "trail": self.trail,
+            "further": self.further,
+            "counts": {f"{k:g}": v for k, v in self.counts.items()},
+        }
+
+
+def essential(
+    observation: Observation | Reduction,
+    settings: EssentialSettings | None = None,
+    estimate: EstimateSettings | None = None,
+    *,
+    model: GeneratedModel | None = None,
+    thresholds: Sequence[float] = THRESHOLDS,
+    provenance: Mapping[str, Any] | None = None,
+) -> Essential:
+    """Essential parameters of an observation by the method of `estimate` (ols or wls).
+
+    thresholds : further ones, counted on the same trail.
+    """
+    settings = settings or EssentialSettings()
+    system = linear_system(observation, estimate or EstimateSettings())
+    wanted = sorted({*thresholds, settings.threshold})
+    steps = _trail(system, wanted[-1])
+    counts = {threshold: len(system.names) - _accepted(steps, threshold) for threshold in wanted}
+    accepted = _accepted(steps, settings.threshold)
+    removals = tuple(Removal(name, relative, ratio, k < accepted) for k, (name, relative, ratio) in enumerate(steps))
+    trail, further = removals[: accepted + 1], removals[accepted + 1 :]
+    gone = {step.name for step in trail if step.removed}
+    kept = tuple(name for name in system.names if name not in gone)
+    reduced = system.select(kept)
+    return Essential(
+        names=kept,
+        estimate=assemble(reduced, reduced.solve(), model=model, provenance=provenance),
+        all_parameters=assemble(system, system.solve(), model=model, provenance=provenance),
+        trail=trail,
+        threshold=settings.threshold,
+        counts=counts,
+        further=further,
+    )
+
+
+def _accepted(steps: Sequence[tuple[str, float, float]], threshold: float) -> int:
+    """Removals before the first whose ratio reaches the threshold."""
+    for k, (_, _, ratio) in enumerate(steps):
+        if not ratio < threshold:
+            return k
+    return len(steps)
+
+
+def _trail(system: System, threshold: float) -> list[tuple[str, float, float]]:
+    """(name, %sigma before it goes, sigma_rho ratio after) until the ratio reaches `threshold` or one parameter is left."""
+    steps: list[tuple[str, float, float]] = []
+    fit = system.solve()
+    first, C = standard_deviations(system, fit)
+    while len(system.names) > 1 and np.isfinite(first):
+        relative = _relative(C, fit.X)
+        worst = system.names[int(np.argmax(relative))]
+        system = system.drop(worst)
+        fit = system.solve()
+        sigma_rho, C = standard_deviations(system, fit)
+        ratio = sigma_rho / first if first > 0 else (1.0 if sigma_rho == 0 else np.inf)
+        steps.append((worst, float(relative.max()), float(ratio)))
+        if ratio >= threshold:
+            break
+    return steps
+
+
+def _relative(C: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """%sigma, shape (b,); inf where the record does not determine the parameter, which therefore goes first."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = 100 * np.sqrt(np.diag(C)) / np.abs(X)
+    return np.where(np.isnan(relative), np.inf, relative)

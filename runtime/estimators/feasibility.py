@@ -1,0 +1,198 @@
+"""Can a physical robot have these base parameters, and which standard parameters would it have?
+
+    feasibility(X)            t* = max t: every condition of `runtime.estimators.physical` holds with margin t, and K chi = X. t* < 0: no robot has X
+    standard_parameters(X)    chi with K chi = X that fulfils every condition, nearest to the values of the robot file (or to zero)
+
+A negative t* is blamed on the condition with the largest multiplier; that one is released and the rest asked again, until it holds.
+Without limits on masses chi is not unique: different chi of one X give the same torques.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from runtime.errors import InputError, SettingsError
+from runtime.estimators.physical import INERTIAL, PhysicalModel
+from runtime.estimators.semidefinite import FURTHEST, Distance, Found, Reference, Rows, closest, margin, solutions
+
+Array = np.ndarray
+Interval = tuple[float | None, float | None]
+
+LEAST = 1e-6  # smallest eigenvalue, SI, that standard parameters keep where there is room
+ROUNDING = 1e-9  # t* above -ROUNDING is zero to the accuracy of the solver
+TYPICAL = {"X": 0.1, "Y": 0.1, "Z": 0.1, "MX": 0.3, "MY": 0.3, "MZ": 0.3, "M": 3.0}  # kg m^2, kg m, kg; scales of the unknowns only
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """Where the mass of a link lies: centre and semi-axes, m, along the axes of the link frame."""
+
+    centre: tuple[float, float, float]
+    axes: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        if not all(a > 0 for a in self.axes):
+            raise SettingsError(f"{self.axes}; expected three positive lengths", path=("axes",))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is known beforehand.
+
+    bounds : [lowest, highest] of standard parameters, by name.   total_mass : kg, of all links together, a number or [lowest, highest].
+    centre : box of the centre of mass by link, m, link frame.   ellipsoid : that holds the mass, by link.
+    """
+
+    bounds: Mapping[str, Interval] = field(default_factory=dict)
+    total_mass: float | tuple[float, float] | None = None
+    centre: Mapping[str, tuple[tuple[float, float], tuple[float, float], tuple[float, float]]] = field(default_factory=dict)
+    ellipsoid: Mapping[str, Ellipsoid] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Feasibility:
+    """margin : t*, SI (kg m^2 or kg of a pseudo-inertia, unit of a friction parameter).   feasible : t* >= 0.
+
+    blocking : conditions that had to be released, in order, each with the t* before; empty where X is feasible.   chi : (p,) at t*.
+    """
+
+    margin: float
+    feasible: bool
+    blocking: tuple[tuple[str, float], ...]
+    chi: Array
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        if self.feasible:
+            least = "at least " if self.margin > 0.999 * FURTHEST else ""
+            return f"physically feasible: every condition holds with a margin of {least}{self.margin:.3g}"
+        named = ", ".join(f"{name} (margin {t:.3g})" for name, t in self.blocking)
+        return f"NOT physically feasible: no positive mass density and friction gives these parameters; in the way: {named}"
+
+
+def feasibility(physical: PhysicalModel, names: Sequence[str], X: Array, limits: Limits | None = None) -> Feasibility:
+    """Whether base parameters X, shape (len(names),), are those of a physical robot within the limits."""
+    rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, scales(physical))
+    first = margin(physical.conditions, rows, space)
+    if not first.solved:
+        raise InputError(unsolved(first.status, rows, lambda other: margin(physical.conditions, other, space)))
+    blocking, conditions, found = [], list(physical.conditions), first
+    while found.solved and found.value < -ROUNDING and conditions:
+        worst = max(found.duals, key=lambda name: found.duals[name])
+        blocking.append((worst, found.value))
+        conditions = [c for c in conditions if c.name != worst]
+        found = margin(conditions, rows, space)
+    return Feasibility(first.value, not blocking, tuple(blocking), first.chi)
+
+
+def standard_parameters(physical: PhysicalModel, names: Sequence[str], X: Array, limits: Limits | None = None) -> Array:
+    """chi, shape (p,), with K chi = X to rounding and every condition fulfilled; raises InputError where X is infeasible.
+
+    Of all such chi the one nearest to the values of the robot file, or to zero where it has none, in units of their size.
+    """
+    judged = feasibility(physical, names, X, limits)
+    if not judged.feasible:
+        raise InputError(f"no standard parameters: {judged.text}; identify with estimate.method: feasible")
+    return nearest_standard(physical, names, X, judged.chi, limits)
+
+
+def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, start: Array, limits: Limits | None = None) -> Array:
+    """The chi of `standard_parameters` where one that fulfils the conditions, `start`, is known."""
+    scale = scales(physical)
+    space, rows = solutions(physical.rows(names), X, scale), limit_rows(physical, limits)
+    chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
+    least = float(np.clip(min(physical.smallest(start).values()) / 2, 0.0, LEAST))
+    found = closest(np.diag(1 / scale), chi0 / scale, physical.conditions, rows, space, least=least)
+    kept = found.solved and min(physical.smallest(found.chi).values()) >= 0
+    return found.chi if kept else start
+
+
+def limit_rows(physical: PhysicalModel, limits: Limits | None) -> Rows:
+    """The limits as rows lower <= A chi <= upper."""
+    limits = limits or Limits()
+    entries: list[tuple[str, dict[int, float], float, float]] = []
+    for name, (low, high) in limits.bounds.items():
+        if name not in physical.standard:
+            message = f"no standard parameter {name}; there are {', '.join(physical.standard)}"
+            raise SettingsError(message, path=("estimate", "options", "bounds", name))
+        entries.append((f"bounds of {name}", {physical.standard.index(name): 1.0}, *_ends(low, high)))
+    if limits.total_mass is not None:
+        low, high = limits.total_mass if isinstance(limits.total_mass, tuple) else (limits.total_mass, limits.total_mass)
+        entries.append(("total_mass", {physical.link(j)[-1]: 1.0 for j in physical.links}, low, high))
+    for key, box in limits.centre.items():
+        ten = physical.link(_link(physical, key, "centre"))
+        for axis, (low, high) in enumerate(box):
+            moment, mass = ten[6 + axis], ten[9]
+            entries.append((f"centre of link {key}", {moment: 1.0, mass: -low}, 0.0, np.inf))
+            entries.append((f"centre of link {key}", {moment: -1.0, mass: high}, 0.0, np.inf))
+    for key, ellipsoid in limits.ellipsoid.items():
+        j = _link(physical, key, "ellipsoid")
+        condition = next(c for c in physical.conditions if c.name == f"link {j}")
+        weights = np.einsum("kij,ij->k", condition.B, _inside(ellipsoid))
+        entries.append((f"ellipsoid of link {key}", dict(zip(condition.numbers, weights.tolist(), strict=True)), 0.0, np.inf))
+    A = np.zeros((len(entries), len(physical.standard)))
+    for row, (_, weights_of, _, _) in enumerate(entries):
+        A[row, list(weights_of)] = list(weights_of.values())
+    lower, upper = (np.array([entry[k] for entry in entries], dtype=float) for k in (2, 3))
+    return Rows(tuple(entry[0] for entry in entries), A, lower, upper)
+
+
+def scales(physical: PhysicalModel) -> Array:
+    """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones where it has none or zero."""
+    sizes = []
+    for name in physical.standard:
+        family = name.rstrip("0123456789")
+        typical = TYPICAL.get(family, 0.1 if family in INERTIAL else 1.0)
+        value = abs(physical.values.get(name, 0.0))
+        sizes.append(max(value, 1e-2 * typical) if physical.values else typical)
+    return np.array(sizes)
+
+
+def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Reference | None:
+    """The pull to the values of the robot file; InputError where they are missing or not those of a body."""
+    if kind == "none" or weight == 0:
+        return None
+    numbers = tuple(k for j in physical.links for k in physical.link(j))
+    missing = [physical.standard[k] for k in numbers if physical.standard[k] not in physical.values]
+    if missing:
+        raise SettingsError(
+            f"the robot file has no values of {', '.join(missing)}; give them, or use prior: none", path=("estimate", "options", "prior")
+        )
+    chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
+    flat = [c.name for c in physical.conditions if c.name.startswith("link ") and c.smallest(chi0) <= 0]
+    if flat and kind != "euclidean":
+        message = f"{kind} needs positive definite pseudo-inertias; the values of {', '.join(flat)} have none. Use prior: euclidean"
+        raise SettingsError(message, path=("estimate", "options", "prior"))
+    return Reference(kind, chi0, scales(physical), numbers, weight)
+
+
+def unsolved(status: str, rows: Rows, attempt: Callable[[Rows], Found]) -> str:
+    """What happened, the likely cause, what to try. attempt : the same problem with other rows; each limit is released in turn."""
+    helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
+    if helps:
+        return f"no physical robot within the limits; there is one without {' or without '.join(helps)}: widen it or leave it out"
+    if status.startswith("infeasible") and rows.names:
+        named = ", ".join(dict.fromkeys(rows.names))
+        return f"no physical robot within the limits ({named}); more than one of them contradicts the others: leave them out one by one"
+    return f"the semidefinite program was not solved ({status}); try another margin, a prior, or bounds on the masses"
+
+
+def _inside(e: Ellipsoid) -> Array:
+    """Q with x'Qx = 1 - (x - c)' A^-1 (x - c), A = diag(axes^2): tr(P Q) >= 0 for mass inside."""
+    A, c = np.diag(1 / np.square(e.axes)), np.array([e.centre]).T
+    return np.block([[-A, A @ c], [c.T @ A, 1 - c.T @ A @ c]])
+
+
+def _link(physical: PhysicalModel, key: str, setting: str) -> int:
+    if key not in map(str, physical.links):
+        message = f"no link {key!r}; links are {', '.join(map(str, physical.links))}"
+        raise SettingsError(message, path=("estimate", "options", setting, key))
+    return int(key)
+
+
+def _ends(low: float | None, high: float | None) -> tuple[float, float]:
+    return -np.inf if low is None else low, np.inf if high is None else high

@@ -1,0 +1,1 @@
+"""Which motion tells most about the parameters (chapter, section 2.2.3)."""

@@ -1,0 +1,215 @@
+"""Exciting trajectories: what is asked of them, and how good a motion is (chapter, section 2.2.3).
+
+The observation matrix is judged as an estimator uses it: rows of joint j divided by the deviation s_j of its torque, columns multiplied by the
+size of their parameter, so that parameters are compared by their relative error.
+
+    W_w = diag(1/s_j) W diag(|X_i|)       cond      s_max/s_min of W_w
+                                          logdet    -log det W_w'W_w
+                                          sigma     largest %sigma_i, the root of the diagonal of C
+    C = A W_w'Omega W_w A, A = (W_w'W_w)^-1       predicted covariance of X_i/|X_i|
+
+Omega is what the decimation makes of white torque noise: neighbouring rows are correlated, which costs a tenth of the precision or more.
+
+W is that of the identification: the motion, sampled at the controller rate, goes through the filters and the decimation of the study.
+Parameters smaller than a hundredth of the largest of their unit count as if they had that size. `runtime.excitation.search` searches the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError, SettingsError
+from runtime.model.generated import GeneratedModel, require
+from runtime.observation.filters import decimation_factor
+from runtime.observation.noise_gain import bandwidth
+from runtime.observation.observation import Observation, observe
+from runtime.records.record import Record
+from runtime.settings.excitation import ExcitationSettings
+from runtime.settings.study import Signals, Study
+from runtime.settings.trajectories import Motion
+
+Array = np.ndarray
+
+SMALLEST = 0.01  # of the largest parameter of the same unit: what a smaller one counts as
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Lower and upper q, largest |qd|, |qdd|, |tau| (inf: unlimited), shape (n,) each; SI."""
+
+    lower: Array
+    upper: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+
+    def of(self, share: float) -> Limits:
+        """The limits with `share` of each kept free; of a range, of its half width."""
+        middle, half = (self.lower + self.upper) / 2, (1 - share) * (self.upper - self.lower) / 2
+        return Limits(middle - half, middle + half, *((1 - share) * x for x in (self.qd, self.qdd, self.tau)))
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """How W is judged: columns `names`, deviation s_j of each joint, shape (n,), and size of each parameter, shape (c,)."""
+
+    names: tuple[str, ...]
+    s: Array
+    size: Array
+
+    def matrix(self, seen: Observation) -> Array:
+        """W_w, shape (r, c)."""
+        return np.asarray(seen.columns(self.names).W / self.s[seen.joints][:, None] * self.size)
+
+    def condition(self, seen: Observation) -> float:
+        """Condition number of W_w; inf where it is singular."""
+        values = np.linalg.svd(np.linalg.qr(self.matrix(seen), mode="r"), compute_uv=False)
+        return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
+
+    def relative_sigma(self, seen: Observation, correlation: Sequence[float] | Array = (1.0,)) -> Array:
+        """Predicted %sigma of the parameters, shape (c,), of their size.
+
+        correlation : of the torque noise of a joint between rows 0, 1, 2 ... sampling periods apart (`kept_correlation`).
+        """
+        W = self.matrix(seen)
+        inverse = np.linalg.inv(np.linalg.qr(W, mode="r"))
+        spread = np.zeros((W.shape[1], W.shape[1]))  # W' Omega W
+        for j in range(seen.n):
+            at = np.rint((seen.t[seen.joint(j)] - seen.t.min()) * seen.rate).astype(int)
+            rows = np.zeros((at.max(initial=0) + 1, W.shape[1]))
+            rows[at] = W[seen.joint(j)]
+            spread += correlation[0] * rows.T @ rows
+            for k, r in enumerate(correlation[1:], start=1):
+                shifted = rows[:-k].T @ rows[k:]
+                spread += r * (shifted + shifted.T)
+        C = inverse @ inverse.T @ spread @ inverse @ inverse.T
+        return np.asarray(100 * np.sqrt(np.diag(C)))
+
+
+@dataclass(frozen=True)
+class Excess:
+    """A limit that a motion passes: what, joint (from 1), largest value, limit, when."""
+
+    what: str
+    joint: int
+    value: float
+    limit: float
+    time: float
+
+    def __str__(self) -> str:
+        return f"{self.what} of joint {self.joint} is {self.value:.4g} at {self.time:.3f} s, limit {self.limit:.4g}"
+
+
+def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> Limits:
+    """The limits of the robot file, changed by `given`; raises SettingsError where q, qd or qdd has none."""
+    n = len(model.JOINTS)
+    known = {**dict(getattr(model, "LIMITS", None) or {}), **given}
+    missing = [name for name in ("q", "qd", "qdd") if known.get(name) is None]
+    if missing:
+        raise SettingsError(f"{model.NAME} has no limits of {', '.join(missing)}; give them here or in the robot file", path=("limits",))
+    unknown = known.keys() - {"q", "qd", "qdd", "tau"}
+    if unknown:
+        raise SettingsError(f"no limit {', '.join(sorted(unknown))}; there are q, qd, qdd, tau", path=("limits",))
+    found = {}
+    for name in ("qd", "qdd", "tau"):
+        found[name] = np.array(np.broadcast_to(np.asarray(known.get(name, np.inf), dtype=float), (n,)))
+        if not np.all(found[name] > 0):
+            raise SettingsError(f"{name}: {found[name].tolist()}; expected more than 0", path=("limits", name))
+    ranges = [(-float(x), float(x)) if np.ndim(x) == 0 else tuple(map(float, x)) for x in known["q"]]
+    if len(ranges) != n or any(len(x) != 2 or not x[0] < x[1] for x in ranges):
+        raise SettingsError(f"{known['q']}; expected {n} numbers or pairs (lower, upper)", path=("limits", "q"))
+    lower, upper = np.array(ranges).T
+    return Limits(lower, upper, found["qd"], found["qdd"], found["tau"])
+
+
+def weights_of(
+    model: GeneratedModel, settings: ExcitationSettings, X: Mapping[str, float], *, essential: Sequence[str] = (), s: Sequence[float] = ()
+) -> Weights:
+    """Columns, deviations and sizes from the parameters X by name; `essential`, `s`: those of an estimate where there is one."""
+    n = len(model.JOINTS)
+    if settings.columns == "essential":
+        names = tuple(essential) or tuple(model.BASE_PARAMETERS)
+    else:
+        names = tuple(model.BASE_PARAMETERS) if settings.columns == "all" else tuple(settings.columns)
+    unknown = [name for name in names if name not in model.BASE_PARAMETERS]
+    if unknown:
+        raise SettingsError(f"no parameter {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}", path=("columns",))
+    deviation = np.array(settings.torque_sigma or tuple(s) or (1.0,) * n, dtype=float)
+    if deviation.shape != (n,) or not np.all(deviation > 0):
+        raise SettingsError(f"{deviation.tolist()}; expected {n} numbers above 0", path=("torque_sigma",))
+    units = dict(getattr(model, "UNITS", {}))
+    largest: dict[str, float] = {}
+    for name in names:
+        largest[units.get(name, "")] = max(largest.get(units.get(name, ""), 0.0), abs(X[name]))
+    if not all(largest.values()):
+        raise InputError(
+            f"every parameter in {', '.join(u for u, x in largest.items() if not x)} is zero; give values in the robot file or an estimate"
+        )
+    return Weights(names, deviation, np.array([max(abs(X[name]), SMALLEST * largest[units.get(name, "")]) for name in names]))
+
+
+def criterion_of(weights: Weights, seen: Observation, criterion: str) -> float:
+    """The criterion on the rows of the identification, exact; smaller is better."""
+    if criterion == "cond":
+        return weights.condition(seen)
+    if criterion == "sigma":  # white residuals: the order of candidates does not depend on it
+        return float(weights.relative_sigma(seen).max())
+    return float(-2 * np.sum(np.log(np.abs(np.diag(np.linalg.qr(weights.matrix(seen), mode="r"))))))
+
+
+def kept_correlation(signals: Signals, rate: float) -> Array:
+    """Correlation that the decimation leaves between rows 0, 1, 2 ... kept samples apart where the torque noise is white at `rate`, Hz."""
+    factor = decimation_factor(signals, rate)
+    kept = bandwidth(replace(signals, median=1), rate).decimation[::factor] if factor > 1 else np.ones(1)
+    return np.asarray(kept[: 1 + np.max(np.flatnonzero(np.abs(kept) > 1e-3 * kept[0]))] / kept[0])
+
+
+def observed(model: GeneratedModel, motion: Motion, study: Study, rate: float) -> Observation:
+    """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The rows' time window is not that of a record."""
+    t, q, *_ = motion.sampled(rate)
+    record = Record(t=t, q=q, tau=np.zeros_like(q), rate=rate, name="planned motion")
+    return observe(model, record, replace(study, rows=replace(study.rows, window=(None, None))))
+
+
+def excesses(
+    model: GeneratedModel, motion: Motion, limits: Limits, settings: ExcitationSettings, X: Array, rate: float | None = None
+) -> list[Excess]:
+    """Limits that the motion passes on the grid of the controller: the worst instant of each joint and quantity. Distances are not among them."""
+    require(model, "inverse_dynamics")
+    functions: Any = model
+    t, q, qd, qdd = motion.sampled(settings.rate if rate is None else rate)
+    tau = functions.inverse_dynamics(q, qd, qdd, X)
+    change = np.abs(np.gradient(tau, t, axis=0))
+    n, inf = q.shape[1], np.inf
+    found = []
+    bounds = [
+        ("position", q, limits.lower, limits.upper),
+        ("velocity", qd, -limits.qd, limits.qd),
+        ("acceleration", qdd, -limits.qdd, limits.qdd),
+        ("torque", tau, -limits.tau, limits.tau),
+        ("rate of torque", change, np.full(n, -inf), np.array(settings.torque_rate or [inf] * n)),
+        ("rms torque", np.sqrt(np.mean(tau**2, axis=0))[None], np.full(n, -inf), np.array(settings.torque_rms or [inf] * n)),
+    ]
+    for what, x, lower, upper in bounds:
+        beyond = np.maximum(x - upper, lower - x)
+        for j in range(n):
+            k = int(np.argmax(beyond[:, j]))
+            if beyond[k, j] > 1e-9 * max(1.0, abs(x[k, j])):
+                limit = upper[j] if x[k, j] > upper[j] else lower[j]
+                found.append(Excess(what, j + 1, float(x[k, j]), float(limit), float(t[k])))
+    return found
+
+
+def usage(model: GeneratedModel, motion: Motion, limits: Limits, rate: float, X: Array) -> dict[str, list[float]]:
+    """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint; of a range, measured from its middle."""
+    functions: Any = model
+    _, q, qd, qdd = motion.sampled(rate)
+    middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
+    shares = {"position": (q - middle) / half, "velocity": qd / limits.qd, "acceleration": qdd / limits.qdd}
+    if np.isfinite(limits.tau).any():
+        shares["torque"] = functions.inverse_dynamics(q, qd, qdd, X) / limits.tau
+    return {what: np.abs(x).max(axis=0).tolist() for what, x in shares.items()}

@@ -1,0 +1,1 @@
+"""One call from records to parameters, and how far to trust them."""

@@ -1,0 +1,200 @@
+"""Torque constants of the drives from a weighed load: what the drives call a torque, in units of what the load weighs.
+
+The torque of a record is v, computed with the torque constants of the robot file; the true one is g v, a factor per motor. V holds the share of
+every motor in the torque of every joint (block diagonal without coupling), a without the load, b with it:
+
+    [[V_a, -W_a, 0, 0], [V_b, -W_b, -W_Lu, -W_Lk chi_Lk]] [g; X; chi_Lu; 1] = 0
+
+    together   W and the load's columns are exact, V is noisy: total least squares with exact columns. With Q a basis of the exact columns and D the
+               deviations of the columns of V, g ~ D^-1 times the smallest right singular vector of (V - Q Q'V) D^-1; the last entry gives the size.
+    per joint  v_j = W_j (X/g_j) + W_Lu (chi_Lu/g_j) + W_Lk chi_Lk (1/g_j): one least squares per motor, noise on the left side alone;
+               drives without coupling only.
+
+A motor whose torque does not change with the load says nothing: its gain is refused by its own deviation. Without a weighed load no record can tell
+g from X.
+
+Reference: Gautier and Briot (2011), global identification of drive gains and dynamic parameters; identification.md 5.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.optimize import nnls
+
+from runtime.errors import InputError
+from runtime.estimators.block_covariance import block_of_rows, default_block
+from runtime.estimators.estimate import aligned
+from runtime.estimators.linear import assemble
+from runtime.estimators.ols import system
+from runtime.estimators.physical import physical_model
+from runtime.identification.payload import carried
+from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel
+from runtime.observation.filters import filtered_states
+from runtime.observation.observation import Observation, decimated_torque, observation_from_states, stack
+from runtime.observation.qr_factor import triangularise
+from runtime.observation.rows import select_rows
+from runtime.records.record import Record
+from runtime.settings.study import EstimateSettings, PayloadSettings, Study
+
+Array = np.ndarray
+
+REFUSED = 20.0  # %sigma from which a gain is not a result
+RUNS = 40  # resampled records behind sigma of the joint solution
+INDEPENDENT = 1e-9  # smallest part of a unit column that the columns before it do not hold
+
+
+@dataclass(frozen=True, eq=False)
+class DriveGains:
+    """Factors g on the torque constants of the robot file, one per motor; nan where a method has none.
+
+    together, sigma : total least squares over all joints; sigma from resampled blocks of time.   alone, sigma_alone : each motor by itself.
+    constant : torque constants of the robot file, shape (n,), N m/A or N m/V.
+    """
+
+    joints: tuple[str, ...]
+    constant: Array
+    together: Array
+    sigma: Array
+    alone: Array
+    sigma_alone: Array
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Motors whose torque does not tell: %sigma of the joint solution is REFUSED or more."""
+        return tuple(j for j, g, s in zip(self.joints, self.together, self.sigma, strict=True) if not 100 * s < REFUSED * abs(g))
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        if not self.refused:
+            return "every gain is determined by the load"
+        return f"REFUSED, the load does not change their torque enough (%sigma from {REFUSED:g}): motor {', '.join(self.refused)}"
+
+    def __str__(self) -> str:
+        return self.to_table()
+
+    def to_table(self) -> str:
+        """One line per motor."""
+        rows: list[Sequence[str]] = [("motor", "gain", "sigma", "alone", "sigma", "torque constant", "")]
+        for k, joint in enumerate(self.joints):
+            pairs = ((self.together[k], self.sigma[k]), (self.alone[k], self.sigma_alone[k]))
+            cells = [format(x, ".5g") if np.isfinite(x) else "-" for pair in pairs for x in pair]
+            refused = joint in self.refused
+            rows.append((joint, *cells, "-" if refused else f"{self.constant[k] * self.together[k]:.6g}", "refused" if refused else ""))
+        return aligned(rows)
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        names = ("joints", "constant", "together", "sigma", "alone", "sigma_alone", "refused")
+        return {name: getattr(self, name) for name in names}
+
+
+def drive_gains(
+    model: GeneratedModel, without: Sequence[Record], loaded: Sequence[Record], study: Study, settings: PayloadSettings, *, seed: int = 1
+) -> DriveGains:
+    """Gains from joint-side records without and with a load of known mass."""
+    if not without or not loaded or "M" not in settings.known:
+        raise InputError("drive gains need a record without the load, one with it, and its weighed mass (payload.known: {M: ...})")
+    drives = Drives.from_mapping(model.DRIVES or {"ratio": np.eye(len(model.JOINTS))})
+    seen = stack(
+        [
+            *(_with_load(model, _observed(model, record, study, drives), settings, 0.0) for record in without),
+            *(_with_load(model, _observed(model, record, study, drives), settings, 1.0) for record in loaded),
+        ]
+    )
+    n = drives.n
+    exact, load, V = seen.W[:, : -n - 1], seen.W[:, -n - 1], seen.W[:, -n:]
+    scatter, alone, sigma_alone = _alone(seen, exact, load, V, drives)
+    together, sigma = _together(seen, exact, load, V, scatter, drives, seed)
+    return DriveGains(tuple(map(str, model.JOINTS)), np.asarray(drives.torque_constant), together, sigma, alone, sigma_alone)
+
+
+def _observed(model: GeneratedModel, record: Record, study: Study, drives: Drives) -> Observation:
+    """W and Y of a record, and behind W one column per motor: its share in the torque of the joint of the row."""
+    states = filtered_states(record.q, record.rate, study.signals)
+    selection = select_rows(record, states.qd, study.signals, study.rows)
+    seen = observation_from_states(model, states, decimated_torque(record.tau, selection), selection, files=record.files)
+    motor = drives.motor_command(record.tau) * drives.torque_constant
+    mask = selection.mask.ravel()
+    shares = [decimated_torque(motor[:, [m]] * drives.ratio[m], selection).ravel()[mask] for m in range(drives.n)]
+    names = (*seen.names, *(f"motor {m + 1}" for m in range(drives.n)))
+    return replace(seen, W=np.asfortranarray(np.column_stack([seen.W, *shares])), names=names)
+
+
+def _with_load(model: GeneratedModel, seen: Observation, settings: PayloadSettings, load: float) -> Observation:
+    """Columns W, W_Lu (times load), the torque of the known part of the load, motors."""
+    physical = physical_model(model)
+    own = carried(model, physical, settings)
+    b = len(model.BASE_PARAMETERS)
+    W, V = seen.W[:, :b], seen.W[:, b:]
+    known = load * (W @ own.known)
+    names = (*seen.names[:b], *(f"{family} of the load" for family in own.unknown), "known load", *seen.names[b:])
+    return replace(seen, W=np.asfortranarray(np.column_stack([W, load * (W @ own.columns), known, V])), names=names)
+
+
+def _alone(seen: Observation, exact: Array, load: Array, V: Array, drives: Drives) -> tuple[Array, Array, Array]:
+    """Deviation of the torque residual of every joint, and 1/(coefficient of the load) where one motor moves one joint."""
+    n = seen.n
+    scatter, gain, sigma = np.ones(n), np.full(n, np.nan), np.full(n, np.nan)
+    coupled = drives.ratio != np.diag(np.diag(drives.ratio))
+    for j in range(n):
+        rows = seen.joint(j)
+        A = np.column_stack([exact[rows], load[rows]])
+        used = [k for k in range(A.shape[1]) if A[:, k].any()]
+        names = tuple(seen.names[k] for k in used)
+        own = Observation(
+            np.asfortranarray(A[:, used]), seen.Y[rows], seen.rows[j : j + 1], names, seen.t[rows], seen.record[rows], seen.rate
+        )
+        rows_of = system(own, EstimateSettings())
+        fit = assemble(rows_of, rows_of.solve())
+        scatter[j] = fit.sigma_rho
+        if "known load" in names and not coupled[j].any() and not coupled[:, j].any():
+            k = names.index("known load")
+            gain[j] = 1 / fit.X[k]
+            sigma[j] = max(fit.sigma[k], fit.sigma_corrected[k]) * gain[j] ** 2
+    return scatter, gain, sigma
+
+
+def _together(seen: Observation, exact: Array, load: Array, V: Array, scatter: Array, drives: Drives, seed: int) -> tuple[Array, Array]:
+    """g by total least squares with exact columns, and its scatter over resampled blocks of time."""
+    weight = np.repeat(1 / np.maximum(scatter, 1e-12 * np.abs(seen.Y).max()), seen.rows)
+    E = exact[:, _independent(exact)]
+    A = np.column_stack([E, load, V]) * weight[:, None]
+    D = _column_deviations(seen.rows, scatter, drives)
+    blocks = block_of_rows(seen, default_block(seen))
+    parts = [triangularise(A[blocks == k]) for k in range(int(blocks.max()) + 1)]
+    found = _gains(triangularise(np.vstack(parts)), D)
+    rng = np.random.default_rng(seed)
+    runs = [_gains(triangularise(np.vstack([parts[k] for k in rng.integers(len(parts), size=len(parts))])), D) for _ in range(RUNS)]
+    return found, np.asarray(np.std(runs, axis=0, ddof=1))
+
+
+def _gains(R: Array, D: Array) -> Array:
+    """g from the triangular factor of [exact, known load, V]."""
+    n = len(D)
+    g = np.linalg.svd(R[-n:, -n:] / D)[2][-1] / D
+    along = R[-n - 1, -n:] @ g / R[-n - 1, -n - 1] if R[-n - 1, -n - 1] else 0.0
+    return np.asarray(g / along if along else np.full(n, np.nan))
+
+
+def _column_deviations(rows: Sequence[int], scatter: Array, drives: Drives) -> Array:
+    """Deviations of the errors of the columns of V with rows of joint j divided by s_j: s_j^2 = sum_m (R_mj sigma_m)^2."""
+    largest = (scatter**2).max()
+    variance = largest * nnls(drives.ratio.T**2, scatter**2 / largest)[0]  # scaled: nnls of SciPy 1.13 takes tiny values for zero
+    weighted = (drives.ratio**2 * variance[:, None] / scatter**2) @ np.asarray(rows, dtype=float)
+    return np.asarray(np.sqrt(np.maximum(weighted, 1e-6 * weighted.max())))
+
+
+def _independent(A: Array) -> Array:
+    """Columns of A that the others do not hold, by pivoting on unit columns."""
+    norms = np.linalg.norm(A, axis=0)
+    used = np.flatnonzero(norms)
+    R, order = qr(triangularise(A[:, used] / norms[used]), mode="r", pivoting=True)
+    size = np.abs(np.diag(R))
+    return np.asarray(np.sort(used[order[size > INDEPENDENT * size[0]]]))

@@ -1,0 +1,241 @@
+"""The friction of every joint as a curve: what the rest of the model leaves of the torque, against velocity, and which law it follows.
+
+    f_j = Y_j - W_j X without the friction and offset of joint j          (Y, W decimated, X of a fit of all parameters)
+
+    coulomb+viscous   FS s + FV v + OFFSET                                  s = sign(v)
+    asymmetric        FSP, FVP forward, FSN, FVN backward
+    stribeck          FS s + FV v + OFFSET + FST s exp(-(v/VS)^2)           FST the excess at standstill, VS its velocity
+    load              FS s + FV v + OFFSET + FL s |tau_r|                   tau_r the rigid-body torque the transmission carries
+    stribeck+load     both
+
+Every term is built at the rate of the record and decimated like Y, so that the filter rounds sign(v) on both sides alike. Every law contains the
+first and is linear but for VS, which is searched (its F-test is approximate: VS means nothing where FST = 0). Residuals are correlated: deviations take blocks of time as independent, and the F-test and Akaike's
+criterion count N/T samples, T the correlation time of the residual in rows. The law is chosen on blocks of time that did not fit it.
+X is held: this says what form friction has, not what the other parameters would be with it.
+
+References: Armstrong-Helouvry, Dupont and Canudas de Wit (1994), section 2, for the laws; Hamon, Gautier and Garrec (2010) for friction that
+grows with the load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.estimators.block_covariance import block_of_rows, default_block
+from runtime.estimators.estimate import Estimate, aligned
+from runtime.estimators.physical import physical_model
+from runtime.identification.friction_laws import (
+    LAWS,
+    Terms,
+    correlation_time,
+    deviations,
+    fitted,
+    held_out_error,
+    joined,
+    law_torque,
+    p_value,
+    percent,
+)
+from runtime.model.generated import GeneratedModel, require
+from runtime.observation.filters import decimated, filtered_states
+from runtime.observation.observation import decimated_torque, observation_from_states
+from runtime.observation.rows import select_rows
+from runtime.records.record import Record
+from runtime.settings.study import Study
+
+Array = np.ndarray
+
+OWN = ("viscous", "coulomb", "offset")  # kinds of elements that make the curve
+BINS = 40
+NORMAL = 1.96  # half width of a 95 % interval in deviations
+GAIN = 0.01  # a law with more terms must lower the held-out error by this share, and pass the F-test at ...
+LEVEL = 0.01
+
+
+@dataclass(frozen=True)
+class FrictionLaw:
+    """One law fitted to one joint.
+
+    error : 100 ||f - law|| / ||f|| in %, on all rows; held_out : on blocks that did not fit it.   aic : difference to the first law.
+    p_value : of the F-test against the first law, 1 for itself.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    sigma: Mapping[str, float]
+    error: float
+    held_out: float
+    aic: float
+    p_value: float
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionCurve:
+    """Friction of one joint, N m or N against rad/s or m/s.
+
+    centre, mean, half : of the bins of velocity with their 95 % intervals.   laws : the first is Coulomb and viscous; chosen : the one that predicts.
+    drawn : values of each law that depends on velocity alone at `centre`; with load at its mean there.
+    """
+
+    joint: str
+    v: Array
+    f: Array
+    centre: Array
+    mean: Array
+    half: Array
+    laws: tuple[FrictionLaw, ...]
+    chosen: str
+    drawn: Mapping[str, Array]
+
+    @property
+    def law(self) -> FrictionLaw:
+        """The chosen law."""
+        return next(law for law in self.laws if law.name == self.chosen)
+
+    def to_table(self) -> str:
+        """Laws line by line, then the parameters of the chosen one."""
+        rows: list[Sequence[str]] = [(f"joint {self.joint}", "error %", "held out %", "AIC", "p of F", "")]
+        for law in self.laws:
+            cells = (f"{law.error:.3f}", f"{law.held_out:.3f}", f"{law.aic:+.1f}", f"{law.p_value:.2g}")
+            rows.append((law.name, *cells, "chosen" if law.name == self.chosen else ""))
+        values = ", ".join(f"{name} {x:.4g} +- {self.law.sigma[name]:.2g}" for name, x in self.law.parameters.items())
+        return f"{aligned(rows)}\n{self.chosen}: {values}" + (f"\n{self.note}" if self.note else "")
+
+    @property
+    def label(self) -> str:
+        """The chosen law, told apart where its Stribeck term makes no peak."""
+        return f"{self.chosen} (no peak)" if self.law.parameters.get("FST", 1.0) < 0 else self.chosen
+
+    @property
+    def note(self) -> str:
+        """What the sign of FST means; empty for laws without it."""
+        excess = self.law.parameters.get("FST")
+        if excess is None:
+            return ""
+        if excess > 0:
+            return "friction is larger at standstill than in slow motion: the Stribeck effect"
+        return "FST is negative: friction falls towards standstill, there is no Stribeck peak; the term bends the curve of viscous friction"
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        curve = {"velocity": self.centre, "torque": self.mean, "half_interval": self.half}
+        return {"joint": self.joint, "chosen": self.chosen, "note": self.note, "laws": self.laws, "curve": curve}
+
+
+def friction_curves(model: GeneratedModel, records: Sequence[Record], study: Study, fit: Estimate) -> tuple[FrictionCurve, ...]:
+    """One curve per joint of the records, joint side, with the parameters of `fit`."""
+    require(model, "inverse_dynamics")
+    parts = [_terms(model, record, study, fit, k) for k, record in enumerate(records)]
+    return tuple(_curve(str(model.JOINTS[j]), joined([part[j] for part in parts])) for j in range(len(model.JOINTS)))
+
+
+def own_friction(model: GeneratedModel, j: int) -> list[int]:
+    """Base parameters made of friction and offset of joint number j alone (j from 0), those of its curve."""
+    physical = physical_model(model)
+    elements: Mapping[str, Any] = cast(Any, model).ELEMENTS
+    own = [name in elements and elements[name][0] in OWN for name in physical.standard]
+    structure = np.asarray(model.STRUCTURE)
+    alone = structure[:, j] & (structure.sum(axis=1) == 1)
+    return [int(k) for k in np.flatnonzero(alone) if not physical.K[k][~np.array(own)].any()]
+
+
+def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, number: int) -> list[Terms]:
+    """Terms of every joint of one record."""
+    states = filtered_states(record.q, record.rate, study.signals)
+    selection = select_rows(record, states.qd, study.signals, study.rows)
+    seen = observation_from_states(model, states, decimated_torque(record.tau, selection), selection)
+    window = states[selection.samples]
+    X = np.array([fit[name] if name in fit.names else 0.0 for name in model.BASE_PARAMETERS])
+    block = block_of_rows(seen, default_block(seen))
+
+    def at_rows(signal: Array, j: int) -> Array:
+        return decimated(signal, selection.factor, selection.signals.decimate)[..., selection.mask[j]]
+
+    terms = []
+    for j in range(seen.n):
+        rest = X.copy()
+        rest[own_friction(model, j)] = 0.0
+        rows, v = seen.joint(j), window.qd[:, j]
+        carried = np.abs(cast(Any, model).inverse_dynamics(window.q, window.qd, window.qdd, rest)[:, j])
+        s = np.sign(v)
+        signals = {
+            "FS": s,
+            "FV": v,
+            "OFFSET": np.ones_like(v),
+            "FSP": (v > 0) * 1.0,
+            "FVP": np.maximum(v, 0),
+            "FSN": (v < 0) * -1.0,
+            "FVN": np.minimum(v, 0),
+            "FL": s * carried,
+        }
+
+        def excess(VS: float, v: Array = v, j: int = j) -> Array:
+            return at_rows(np.sign(v) * np.exp(-((v / VS) ** 2)), j)
+
+        linear = {name: at_rows(signal, j) for name, signal in signals.items()}
+        own_block = block[rows] + (number << 32)
+        terms.append(Terms(seen.Y[rows] - seen.W[rows] @ rest, linear["FV"], own_block, linear, excess))
+    return terms
+
+
+def _curve(joint: str, terms: Terms) -> FrictionCurve:
+    if len(terms.f) < 10 * len(LAWS["stribeck+load"]):
+        raise InputError(f"{len(terms.f)} rows of joint {joint}; a friction curve needs more of the record (rows.window, rows.low_speed)")
+    every = np.ones(len(terms.f), dtype=bool)
+    even = terms.block % 2 == 0
+    fits = {name: fitted(terms, names, every) for name, names in LAWS.items()}
+    first = next(iter(LAWS))
+    residuals = {name: terms.f - law_torque(terms, found) for name, found in fits.items()}
+    squares = {name: float(r @ r) for name, r in residuals.items()}
+    count = len(terms.f) / correlation_time(residuals["stribeck+load"])
+    laws = []
+    for name, names in LAWS.items():
+        aic = count * np.log(squares[name] / squares[first]) + 2 * (len(names) - len(LAWS[first]))
+        laws.append(
+            FrictionLaw(
+                name,
+                fits[name],
+                deviations(terms, fits[name], residuals[name]),
+                percent(residuals[name], terms.f),
+                held_out_error(terms, names, even),
+                float(aic),
+                p_value(squares[first], squares[name], len(LAWS[first]), len(names), count),
+            )
+        )
+    centre, mean, half, mean_of = _bins(terms)
+    drawn = {name: mean_of(law_torque(terms, found)) for name, found in fits.items()}
+    return FrictionCurve(joint, terms.v, terms.f, centre, mean, half, tuple(laws), _chosen(laws), drawn)
+
+
+def _chosen(laws: Sequence[FrictionLaw]) -> str:
+    """The smallest held-out error among the laws that are worth their terms; the first where none is."""
+    first, *others = laws
+    worth = [law for law in others if law.p_value < LEVEL and law.held_out < (1 - GAIN) * first.held_out]
+    return min(worth, key=lambda law: law.held_out, default=first).name
+
+
+def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
+    """Centres, means and half intervals over bins of about equal numbers of rows, none across standstill; and what averages others alike."""
+    sides = [terms.v[terms.v < 0], terms.v[terms.v >= 0]]
+    shares = [max(round(BINS * len(side) / len(terms.v)), 1) for side in sides]
+    inner = [np.quantile(side, np.linspace(0, 1, k + 1)) for side, k in zip(sides, shares, strict=True) if len(side)]
+    edges = np.unique(np.concatenate([*inner, [0.0]]))
+    which = np.clip(np.searchsorted(edges, terms.v, side="right") - 1, 0, max(len(edges) - 2, 0))
+    count = np.bincount(which)
+    used = np.flatnonzero(count > 1)
+
+    def mean_of(x: Array) -> Array:
+        return np.asarray((np.bincount(which, weights=x) / np.maximum(count, 1))[used])
+
+    mean = np.bincount(which, weights=terms.f) / np.maximum(count, 1)
+    _, cell = np.unique(which * (terms.block.max() + 1) + terms.block, return_inverse=True)
+    sums = np.bincount(cell, weights=terms.f - mean[which])  # of a bin in a block
+    bin_of = np.zeros(len(sums), dtype=int)
+    bin_of[cell] = which
+    variance = np.bincount(bin_of, weights=sums**2, minlength=len(count)) / np.maximum(count, 1) ** 2
+    return mean_of(terms.v), mean[used], NORMAL * np.sqrt(variance[used]), mean_of

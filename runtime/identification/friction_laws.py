@@ -1,0 +1,120 @@
+"""Laws of friction as terms of a least-squares fit, and how well each predicts rows that did not fit it.
+
+Laws, signs and references: `runtime.identification.friction`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.stats import f as fisher
+
+from runtime.estimators.block_covariance import block_covariance
+
+Array = np.ndarray
+
+SLOWEST, FASTEST = 0.005, 0.5  # of the largest speed: where VS is searched
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Signals of one joint at the rows: friction torque f, velocity v, and the terms of the laws, each of shape (N,); block of time of each row.
+
+    excess : the term of FST for a given VS.
+    """
+
+    f: Array
+    v: Array
+    block: Array
+    linear: Mapping[str, Array]
+    excess: Callable[[float], Array]
+
+
+LAWS: Mapping[str, tuple[str, ...]] = {
+    "coulomb+viscous": ("FS", "FV", "OFFSET"),
+    "asymmetric": ("FSP", "FVP", "FSN", "FVN"),
+    "stribeck": ("FS", "FV", "OFFSET", "FST", "VS"),
+    "load": ("FS", "FV", "OFFSET", "FL"),
+    "stribeck+load": ("FS", "FV", "OFFSET", "FL", "FST", "VS"),
+}
+
+
+def joined(parts: Sequence[Terms]) -> Terms:
+    """The rows of several records."""
+    linear = {name: np.concatenate([part.linear[name] for part in parts]) for name in parts[0].linear}
+    _, block = np.unique(np.concatenate([part.block for part in parts]), return_inverse=True)
+    f, v = (np.concatenate([getattr(part, name) for part in parts]) for name in ("f", "v"))
+    return Terms(f, v, block, linear, lambda VS: np.concatenate([part.excess(VS) for part in parts]))
+
+
+def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
+    """The linear terms of a law, (N, terms)."""
+    return np.column_stack([terms.excess(cast(float, VS)) if name == "FST" else terms.linear[name] for name in names if name != "VS"])
+
+
+def fitted(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
+    """Least squares of a law on some rows; VS by a search on a logarithmic axis."""
+    linear = [name for name in names if name != "VS"]
+
+    def solved(VS: float | None) -> tuple[Array, float]:
+        A, f = _columns(terms, names, VS)[rows], terms.f[rows]
+        x = np.linalg.lstsq(A, f, rcond=None)[0]
+        return x, float(np.sum((f - A @ x) ** 2))
+
+    if "VS" not in names:
+        return dict(zip(linear, map(float, solved(None)[0]), strict=True))
+    grid = np.log(np.abs(terms.v).max() * np.geomspace(SLOWEST, FASTEST, 16))
+    best = grid[np.argmin([solved(float(np.exp(x)))[1] for x in grid])]
+    step = grid[1] - grid[0]
+    ends = (max(best - step, grid[0]), min(best + step, grid[-1]))
+    VS = float(np.exp(minimize_scalar(lambda x: solved(float(np.exp(x)))[1], bounds=ends, method="bounded", options={"xatol": 1e-3}).x))
+    return {**dict(zip(linear, map(float, solved(VS)[0]), strict=True)), "VS": VS}
+
+
+def law_torque(terms: Terms, found: Mapping[str, float]) -> Array:
+    names = tuple(found)
+    return np.asarray(_columns(terms, names, found.get("VS")) @ [found[name] for name in names if name != "VS"])
+
+
+def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
+    """Error in % of rows predicted from the other half of the blocks."""
+    residual = np.empty_like(terms.f)
+    for rows in (even, ~even):
+        residual[~rows] = (terms.f - law_torque(terms, fitted(terms, names, rows)))[~rows]
+    return percent(residual, terms.f)
+
+
+def deviations(terms: Terms, found: Mapping[str, float], residual: Array) -> dict[str, float]:
+    """Deviations by blocks of time, VS by its derivative."""
+    A = _columns(terms, tuple(found), found.get("VS"))
+    if "VS" in found:
+        VS, h = found["VS"], 1e-4 * found["VS"]
+        A = np.column_stack([A, found["FST"] * (terms.excess(VS + h) - terms.excess(VS - h)) / (2 * h)])
+    T = np.linalg.pinv(np.linalg.qr(A, mode="r"))
+    return dict(zip(found, map(float, np.sqrt(np.diag(block_covariance(A, residual, terms.block, T)))), strict=True))
+
+
+def correlation_time(residual: Array) -> float:
+    """1 + 2 sum of the autocorrelations of a residual up to the first that is not positive, in rows; at least 1."""
+    r = residual - residual.mean()
+    spectrum = np.abs(np.fft.rfft(r, 2 * len(r))) ** 2
+    rho = np.fft.irfft(spectrum)[: len(r)]
+    rho = rho / rho[0] if rho[0] > 0 else np.zeros(len(r))
+    end = int(np.argmax(rho <= 0)) or len(r)
+    return float(max(1 + 2 * rho[1:end].sum(), 1.0))
+
+
+def p_value(squares_first: float, squares: float, terms_first: int, terms: int, count: float) -> float:
+    if terms == terms_first or squares <= 0 or count <= terms:
+        return 1.0
+    F = max(squares_first / squares - 1, 0.0) * (count - terms) / (terms - terms_first)
+    return float(fisher.sf(F, terms - terms_first, count - terms))
+
+
+def percent(residual: Array, of: Array) -> float:
+    norm = float(np.linalg.norm(of))
+    return 100 * float(np.linalg.norm(residual)) / norm if norm > 0 else float("nan")

@@ -1,0 +1,230 @@
+"""What a user feels at the handle of a back-drivable robot, from an Estimate and with its uncertainty (chapter, end of 4.2.2).
+
+With J the Jacobian of the handle's velocity, xd = J qd, and the user's force f in place of the motors, J' f = Gamma:
+
+    apparent mass   Lambda = (J A^-1 J')^-1                         f = Lambda xdd from rest, without friction and gravity
+    friction        f_u    = Gamma_f' J^+ u                         u' f while the handle moves along the unit vector u
+    static force    f_0    = J^+' Gamma_0                           Gamma_0: gravity, offsets and springs
+    stiffness       K      = d f_0 / dx = (d f_0 / dq) J^+          positive: the handle pulls back
+
+Gamma_f = (H(q, qd) - H(q, -qd))/2 at qd = J^+ u v is the part of the bias H that changes sign with the motion: friction, whatever its elements are
+called. All four are linear in the parameters or, for Lambda, have the derivative dLambda = B' dA B with B = A^-1 J' Lambda; deviations follow from the
+covariance of the Estimate, eq. (10), by linearisation. Closed loops: the columns of J are the actuated joints.
+
+Where J loses rank there is no such thing as a mass at the handle, and where the estimated A is not positive definite there is no dynamics: those
+configurations are marked and hold nan. They are not smoothed over.
+
+O. Khatib, A unified approach for motion and force control of robot manipulators: the operational space formulation, IEEE J. Robotics and
+Automation 3(1), 1987.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.estimators.estimate import Estimate
+from runtime.model.generated import GeneratedModel, require
+
+Array = np.ndarray
+
+SINGULAR = 1e-2
+"""Smallest over largest singular value of J below which a configuration is singular."""
+SLOW = 1e-3
+"""Speed of the handle at which friction is told, m/s: dry friction alone, in practice."""
+STEP = 1e-5
+"""Step of the differences for the stiffness, rad or m: truncation and rounding errors are both near 1e-10 of the force."""
+Linear = Callable[[Array], Array]  # X of shape (b,) to a quantity of shape (N, ...), linear in X
+
+
+@dataclass(frozen=True, eq=False)
+class Felt:
+    """Values at N configurations and their standard deviations, of one shape (N, ...); nan where the configuration is singular."""
+
+    value: Array
+    sigma: Array
+
+
+@dataclass(frozen=True, eq=False)
+class OperationalSpace:
+    """What is felt at N configurations, in m coordinates of frame 0 (`axes`). SI: m, kg, N, N/m.
+
+    position : ndarray, shape (N, 3), of the handle.   singular : bool, shape (N,).   conditioning : shape (N,), smallest over largest singular value of J.
+    indefinite : bool, shape (N,), where the estimated A is not positive definite.
+    mass : (N, m, m), Lambda.   principal : (N, m), its eigenvalues, ascending, along the columns of `directions`, (N, m, m).
+    friction : (N, m), for motion along each coordinate.   static_force : (N, m).   stiffness : (N, m, m).
+    """
+
+    position: Array
+    singular: Array
+    conditioning: Array
+    indefinite: Array
+    mass: Felt
+    principal: Felt
+    directions: Array
+    friction: Felt
+    static_force: Felt
+    stiffness: Felt
+
+    @property
+    def message(self) -> str:
+        """How many configurations are left out, why, and the first one's number, from 0; empty where none is."""
+        parts = []
+        if self.singular.any():
+            first = int(np.argmax(self.singular))
+            parts.append(
+                f"{int(self.singular.sum())} of {len(self.singular)} configurations are singular (first: {first}, conditioning {self.conditioning[first]:.2g})"
+            )
+        if self.indefinite.any():
+            first = int(np.argmax(self.indefinite))
+            parts.append(
+                f"at {int(self.indefinite.sum())} of {len(self.indefinite)} the estimated inertia matrix is not positive definite (first: {first})"
+            )
+        return "; ".join(parts) + "; nothing is told there." if parts else ""
+
+
+def operational_space(
+    model: GeneratedModel,
+    estimate: Estimate,
+    q: Array,
+    *,
+    frame: int | None = None,
+    axes: Sequence[int] = (0, 1, 2),
+    speed: float = SLOW,
+    singular: float = SINGULAR,
+    constants: Mapping[str, float] | None = None,
+) -> OperationalSpace:
+    """Apparent mass, friction, static force and stiffness felt at the origin of `frame` (default: the model's last).
+
+    Parameters
+    ----------
+    estimate : of all base parameters or of some; those it lacks count as exactly zero.
+    q : ndarray, shape (N, n), actuated joints, rad or m.
+    axes : coordinates of frame 0 in which the handle is free, 0 x, 1 y, 2 z, at most n; (0, 1) for a robot in the x0-y0 plane.
+    speed : of the handle where friction is told, m/s.   singular : limit of the conditioning of J.   constants : in place of the robot file's.
+    """
+    require(model, "jacobian", "frame_poses", "inertia_matrix", "bias", "gravity")
+    q = np.atleast_2d(np.asarray(q, dtype=float))
+    n = len(model.JOINTS)
+    if q.ndim != 2 or q.shape[1] != n:
+        raise InputError(f"{model.NAME}: q has shape {q.shape}; expected (N, {n}) or ({n},)")
+    if not 0 < len(axes) <= n or any(k not in (0, 1, 2) for k in axes) or len(set(axes)) != len(axes):
+        raise InputError(
+            f"axes {tuple(axes)}; expected at most {n} different ones of 0, 1, 2: {n} actuated joints move a handle in no more directions"
+        )
+    frames = len(model.frame_poses(q[0], **dict(constants or {})))  # type: ignore[attr-defined]
+    if not (frame is None or 1 <= frame <= frames) or not speed > 0:
+        raise InputError(f"{model.NAME}: frame {frame}, speed {speed} m/s; expected a frame from 1 to {frames} and a positive speed")
+    X, C = parameters_of(model, estimate)
+    handle = _Handle(model, q, frame, list(axes), dict(constants or {}), singular, X)
+    mass = _felt(handle.mass, X, C)
+    principal, directions = _principal(mass.value, handle.lost)
+    along = _felt(lambda X: _array("nap,nab,nbp->np", directions, handle.mass(X), directions), X, C)
+    return OperationalSpace(
+        position=handle.position,
+        singular=handle.singular,
+        conditioning=handle.conditioning,
+        indefinite=handle.indefinite,
+        mass=mass,
+        principal=Felt(principal, along.sigma),
+        directions=directions,
+        friction=_felt(lambda X: handle.friction(X, speed), X, C),
+        static_force=_felt(handle.static_force, X, C),
+        stiffness=_felt(handle.stiffness, X, C),
+    )
+
+
+class _Handle:
+    """The model at N configurations, seen from the handle; every quantity is linear in X."""
+
+    def __init__(
+        self, model: Any, q: Array, frame: int | None, axes: list[int], constants: dict[str, float], singular: float, X: Array
+    ) -> None:
+        self.model, self.q, self.axes, self.constants = model, q, axes, constants
+        self.frame = {} if frame is None else {"frame": frame}
+        frames = np.asarray(model.frame_poses(q, **constants))
+        self.position = frames[:, (frames.shape[1] if frame is None else frame) - 1, :3, 3]
+        J = self.jacobian(q)
+        s = np.linalg.svd(J, compute_uv=False)
+        self.conditioning = s[:, -1] / s[:, 0]
+        A = np.asarray(model.inertia_matrix(q, X, **constants))
+        self.singular, self.indefinite = ~(self.conditioning >= singular), ~(np.linalg.eigvalsh(A)[:, 0] > 0)
+        self.lost = self.singular | self.indefinite
+        self.inverse = self.inverted(J)
+        JT = np.swapaxes(J, 1, 2)[~self.lost]
+        weighted = np.linalg.solve(A[~self.lost], JT)  # A^-1 J'
+        self.B = np.full_like(self.inverse, np.nan)
+        self.B[~self.lost] = weighted @ np.linalg.inv(J[~self.lost] @ weighted)
+
+    def jacobian(self, q: Array) -> Array:
+        """J, shape (N, m, n)."""
+        return np.asarray(self.model.jacobian(q, **self.frame, **self.constants))[:, self.axes]
+
+    def inverted(self, J: Array) -> Array:
+        """J^+, shape (N, n, m); nan where the configuration is singular."""
+        inverse = np.full(np.swapaxes(J, 1, 2).shape, np.nan)
+        inverse[~self.lost] = np.linalg.pinv(J[~self.lost])
+        return inverse
+
+    def mass(self, X: Array) -> Array:
+        """B' A B: Lambda at the estimate, its differential elsewhere."""
+        return _array("nja,njk,nkb->nab", self.B, self.model.inertia_matrix(self.q, X, **self.constants), self.B)
+
+    def friction(self, X: Array, speed: float) -> Array:
+        """f_u for every coordinate."""
+        forces = []
+        for k in range(len(self.axes)):
+            qd = np.where(self.lost[:, None], 0.0, self.inverse[:, :, k]) * speed
+            forward, backward = (np.asarray(self.model.bias(self.q, v, X, **self.constants)) for v in (qd, -qd))
+            forces.append(_array("nj,nj->n", (forward - backward) / 2, self.inverse[:, :, k]))
+        return np.stack(forces, axis=1)
+
+    def static_force(self, X: Array, q: Array | None = None) -> Array:
+        """f_0 at q, or at one near by."""
+        inverse, q = (self.inverse, self.q) if q is None else (self.inverted(self.jacobian(q)), q)
+        return _array("nja,nj->na", inverse, self.model.gravity(q, X, **self.constants))
+
+    def stiffness(self, X: Array) -> Array:
+        """d f_0 / dq by central differences, times J^+."""
+        steps = STEP * np.eye(self.q.shape[1])
+        columns = [(self.static_force(X, self.q + h) - self.static_force(X, self.q - h)) / (2 * STEP) for h in steps]
+        return _array("naj,njb->nab", np.stack(columns, axis=2), self.inverse)
+
+
+def _array(subscripts: str, *operands: Any) -> Array:
+    return np.asarray(np.einsum(subscripts, *operands))
+
+
+def parameters_of(model: GeneratedModel, estimate: Estimate) -> tuple[Array, Array]:
+    """X, shape (b,), and its covariance, (b, b), in the order of the model; parameters that were not estimated are zero, without deviation."""
+    order = list(model.BASE_PARAMETERS)
+    unknown = [name for name in estimate.names if name not in order]
+    if unknown:
+        raise InputError(f"{', '.join(unknown)}: not base parameters of {model.NAME}; expected an estimate of this model")
+    at = [order.index(name) for name in estimate.names]
+    X, C = np.zeros(len(order)), np.zeros((len(order), len(order)))
+    X[at] = estimate.X
+    C[np.ix_(at, at)] = estimate.covariance
+    return X, C
+
+
+def _felt(quantity: Linear, X: Array, C: Array) -> Felt:
+    """A quantity linear in X with its deviation, sqrt(g' C g); directions without variance are not evaluated."""
+    variances, vectors = np.linalg.eigh(C)
+    value = quantity(X)
+    total = np.zeros_like(value)
+    for variance, vector in zip(variances, vectors.T, strict=True):
+        if variance > 0:
+            total += variance * quantity(vector) ** 2
+    return Felt(value, np.sqrt(total))
+
+
+def _principal(mass: Array, lost: Array) -> tuple[Array, Array]:
+    """Eigenvalues, ascending, and eigenvectors of Lambda; nan where the configuration is singular."""
+    values, vectors = np.full(mass.shape[:2], np.nan), np.full(mass.shape, np.nan)
+    values[~lost], vectors[~lost] = np.linalg.eigh(mass[~lost])
+    return values, vectors

@@ -1,0 +1,165 @@
+"""A mass fixed to a link, or to a frame of it: its parameters from records with and without it, known or unknown.
+
+    [Y_a; Y_b - W_Lk chi_Lk] = [[W_a, 0], [W_b, W_Lu]] [X; chi_Lu]        W_L = W K_L
+
+a without, b with the load; K_L the ten columns of K = dX/dchi of the link that carries it, so chi_L are XX ... M of the load alone at the frame of
+that link, or with K_L A (`runtime.model.mount`) at a frame fixed to it. Known ones (a weighed M) move to the left. What of the ten the motion shows is judged as for any other parameter. Where friction
+changes with the load, rows b have friction columns of their own.
+
+    X_b - X_a = K_L chi_L,    covariance C_a + C_b
+
+is the alternative from two estimates, for records that are gone: less precise, as every other parameter is fitted twice.
+
+Reference: Khalil, Gautier and Lemoine (2007), identification of the payload inertial parameters of industrial manipulators.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError, SettingsError
+from runtime.estimators import estimate
+from runtime.estimators.estimate import Estimate, aligned
+from runtime.estimators.physical import INERTIAL, PhysicalModel, physical_model
+from runtime.estimators.solution import Solution, solve
+from runtime.model.generated import GeneratedModel
+from runtime.model.mount import Mount, load_vector, mount
+from runtime.observation.observation import Observation, stack
+from runtime.observation.qr_factor import Factor, triangularise
+from runtime.settings.study import EstimateSettings, PayloadSettings
+
+Array = np.ndarray
+
+UNITS = {"XX": "kg*m**2", "MX": "kg*m", "M": "kg"}
+LOAD = "L"  # suffix of the load's parameters: ML, MXL, ...; friction under load: FV1L
+FRICTION = ("viscous", "coulomb")
+
+
+@dataclass(frozen=True, eq=False)
+class Payload:
+    """The load on link `link`: ten parameters at its frame, or at `frame` fixed to it, kg, kg m, kg m^2.
+
+    names, value, sigma : of the unknown ones that have an effect, in the order of XX .. M; sigma by time blocks where known, else eq. (10).
+    known : given ones.   estimate : the joint solution with all base parameters, or None where it came from two estimates.
+    """
+
+    link: int
+    names: tuple[str, ...]
+    value: Array
+    sigma: Array
+    known: Mapping[str, float]
+    estimate: Estimate | None = None
+    frame: int | None = None
+
+    @property
+    def place(self) -> str:
+        """Where it is fixed, in words."""
+        return f"link {self.link}" if self.frame in (None, self.link) else f"frame {self.frame} of link {self.link}"
+
+    def __getitem__(self, family: str) -> float:
+        """Value of one parameter by family: payload["M"]."""
+        return float(self.known[family]) if family in self.known else float(self.value[self.names.index(family)])
+
+    def __str__(self) -> str:
+        return self.to_table()
+
+    def to_table(self) -> str:
+        """One line per parameter."""
+        rows: list[Sequence[str]] = [(f"load on {self.place}", "value", "sigma", "unit")]
+        rows += [(name, f"{self.known[name]:.6g}", "given", _unit(name)) for name in self.known]
+        found = zip(self.names, self.value, self.sigma, strict=True)
+        rows += [(name, f"{x:.6g}", f"{s:.2g}" if np.isfinite(s) else "-", _unit(name)) for name, x, s in found]
+        return aligned(rows)
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        found = {n: {"value": x, "sigma": s} for n, x, s in zip(self.names, self.value, self.sigma, strict=True)}
+        return {"link": self.link, "frame": self.frame or self.link, "known": dict(self.known), "parameters": found}
+
+
+def payload(
+    model: GeneratedModel,
+    without: Sequence[Observation],
+    loaded: Sequence[Observation],
+    settings: PayloadSettings,
+    method: EstimateSettings | None = None,
+    *,
+    provenance: Mapping[str, Any] | None = None,
+) -> Payload:
+    """The joint solution of observations without and with the load, all base columns in each, by a linear method (ols or wls)."""
+    if not without or not loaded:
+        raise InputError("a payload needs a record without it and one with it (record, payload.record)")
+    physical = physical_model(model)
+    load = carried(model, physical, settings)
+    friction = friction_columns(model, physical) if settings.friction else []
+    names = (*model.BASE_PARAMETERS, *(f"{family}{LOAD}" for family in load.unknown), *(model.BASE_PARAMETERS[k] + LOAD for k in friction))
+
+    def extended(seen: Observation, there: float) -> Observation:
+        own = there * np.hstack([seen.W @ load.columns, seen.W[:, friction]])
+        Y = seen.Y - there * (seen.W @ load.known)
+        return replace(seen, W=np.asfortranarray(np.hstack([seen.W, own])), Y=Y, names=names)
+
+    both = stack([extended(stack(without), 0.0), extended(stack(loaded), 1.0)])
+    found = estimate(both, method, model=model, provenance=provenance)
+    units = {**found.units, **{f"{family}{LOAD}": _unit(family) for family in load.unknown}}
+    units |= {model.BASE_PARAMETERS[k] + LOAD: found.units.get(model.BASE_PARAMETERS[k], "") for k in friction}
+    found = replace(found, units=units)
+    place = [found.names.index(f"{family}{LOAD}") for family in load.unknown]
+    sigma = np.where(np.isnan(found.sigma_corrected), found.sigma, np.fmax(found.sigma, found.sigma_corrected))
+    return Payload(load.mount.link, load.unknown, found.X[place], sigma[place], dict(settings.known), found, load.mount.frame)
+
+
+def payload_difference(model: GeneratedModel, without: Estimate, loaded: Estimate, settings: PayloadSettings) -> Payload:
+    """The load from two estimates of all base parameters, weighted by the inverse of C_a + C_b."""
+    physical = physical_model(model)
+    load = carried(model, physical, settings)
+    for fit in (without, loaded):
+        if fit.names != physical.base or not np.isfinite(fit.covariance).all():
+            raise InputError("the difference needs estimates of all base parameters of the model, each with a full covariance")
+    L = np.linalg.cholesky(without.covariance + loaded.covariance)
+    dX = loaded.X - without.X - load.known
+    found = _least_squares(np.linalg.solve(L, load.columns), np.linalg.solve(L, dX), load.unknown)
+    sigma = np.sqrt(found.variances())
+    for group in found.groups:
+        sigma[[load.unknown.index(name) for name in group]] = np.nan
+    return Payload(load.mount.link, load.unknown, found.X, sigma, dict(settings.known), frame=load.mount.frame)
+
+
+def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int]:
+    """Base parameters that are made of viscous and Coulomb friction alone."""
+    elements: Mapping[str, Any] = model.ELEMENTS  # type: ignore[attr-defined]
+    friction = np.array([name in elements and elements[name][0] in FRICTION for name in physical.standard])
+    return [k for k, row in enumerate(physical.K) if not row[~friction].any()]
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """mount : where the load is fixed.   unknown : families with an effect.   columns : dX/dchi of these, shape (b, u).   known : X of the given ones."""
+
+    mount: Mount
+    unknown: tuple[str, ...]
+    columns: Array
+    known: Array
+
+
+def carried(model: GeneratedModel, physical: PhysicalModel, settings: PayloadSettings) -> Carried:
+    """What of a load the settings ask for; SettingsError where there is no such link or frame."""
+    try:
+        place = mount(model, settings.frame, settings.link)
+    except InputError as e:
+        raise SettingsError(e.message, path=("payload", "frame" if settings.frame is not None else "link")) from e
+    K = place.columns(physical)
+    free = [k for k, family in enumerate(INERTIAL) if family not in settings.known and K[:, k].any()]
+    return Carried(place, tuple(INERTIAL[k] for k in free), K[:, free], K @ load_vector(settings.known))
+
+
+def _least_squares(A: Array, y: Array, names: Sequence[str]) -> Solution:
+    return solve(Factor(tuple(names), triangularise(np.column_stack([A, y])), ()), tolerance=1e-10)
+
+
+def _unit(family: str) -> str:
+    return UNITS.get(family, UNITS["MX"] if family.startswith("M") else UNITS["XX"])

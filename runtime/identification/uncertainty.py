@@ -1,0 +1,260 @@
+"""How far to trust an identification: what eqs. (9)-(11) and the threshold 1.04 take for granted, checked on the record.
+
+    scatter       blocks of time drawn again with replacement, least squares each time: deviations without the assumption of independent residuals,
+                  beside sigma (10) and the corrected one
+    whiteness     are the residuals of every joint independent (`runtime.identification.residuals`)?
+    F-test        does a parameter that was removed carry something? Removing q of b raises the squared residual norm S from S_0 to S_q:
+                  F = (S_q - S_0)/q / (S_0/(r - b)), F(q, r - b) without effect; r counts only the rows that are worth one (N_eff)
+    sensitivity   which parameters come and go when the threshold on sigma_rho moves
+
+S_q = ratio^2 (r - b + q) S_0/(r - b), with the ratio of sigma_rho that the trail of `runtime.estimators.essential` holds.
+
+References: Kunsch (1989) for the blocks; Seber and Lee (2003), section 4.3, for F.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import fdtrc
+
+from runtime.estimators import linear_companion, linear_system
+from runtime.estimators.block_covariance import block_of_rows
+from runtime.estimators.essential import Essential
+from runtime.estimators.estimate import Estimate, aligned
+from runtime.estimators.linear import System, whitened
+from runtime.identification.residuals import SIGNIFICANT, Whiteness, effective_share, whiteness
+from runtime.identification.validation import Comparison
+from runtime.observation.observation import Observation
+from runtime.observation.reduction import Reduction
+from runtime.settings.study import EstimateSettings
+
+Array = np.ndarray
+
+RUNS = 200
+"""Draws of blocks: sigma is then known to 5 %."""
+SEED = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """Deviations of the essential parameters three ways, shape (b,) each: eq. (10), corrected for correlation, drawn again by blocks."""
+
+    names: tuple[str, ...]
+    sigma: Array
+    corrected: Array
+    drawn: Array
+    blocks: int
+    length: float
+    runs: int = RUNS
+    seed: int = SEED
+
+    @property
+    def ratio(self) -> Array:
+        """Drawn over eq. (10), shape (b,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.drawn / self.sigma)
+
+
+@dataclass(frozen=True)
+class FTest:
+    """One step of the trail. p : of all removals up to it; p_step : of this one against the step before; `significant`: p below 5 %."""
+
+    name: str
+    ratio: float
+    F: float
+    p: float
+    F_step: float
+    p_step: float
+    removed: bool
+
+    @property
+    def significant(self) -> bool:
+        """What went so far carries something."""
+        return self.p < SIGNIFICANT
+
+
+@dataclass(frozen=True, eq=False)
+class Trust:
+    """Checks of one identification. sets : by threshold, count and the names that differ from the set used ("-": removed besides, "+": kept besides)."""
+
+    scatter: Scatter
+    whiteness: tuple[Whiteness, ...]
+    f_tests: tuple[FTest, ...]
+    sets: tuple[tuple[float, int, tuple[str, ...]], ...]
+    all_count: int
+
+    @property
+    def kept_by_f_test(self) -> int:
+        """Parameters left before the first significant removal."""
+        return self.all_count - next((k for k, test in enumerate(self.f_tests) if test.significant), len(self.f_tests))
+
+    def __str__(self) -> str:
+        return self.to_table()
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """One sentence for each check."""
+        ratio = self.scatter.ratio[np.isfinite(self.scatter.ratio)]
+        spread = f"from {ratio.min():.1f} to {ratio.max():.1f}, median {np.median(ratio):.1f}" if len(ratio) else "unknown"
+        coloured = [w.joint for w in self.whiteness if not w.white]
+        white = f"not white on joint {', '.join(coloured)}" if coloured else "white on every joint"
+        share = 100 * effective_share(self.whiteness)
+        kept = self.all_count - sum(test.removed for test in self.f_tests)
+        return (
+            f"Deviations by blocks drawn again are {spread} times sigma (10): {self.scatter.blocks} blocks of {self.scatter.length:.3g} s, {self.scatter.runs} draws.",
+            f"Residuals are {white} (Ljung-Box, 5 %); the rows are worth {share:.0f} % of their number.",
+            f"The threshold keeps {kept} parameters, an F-test at 5 % on the rows that count keeps {self.kept_by_f_test}.",
+        )
+
+    def to_table(self) -> str:
+        """Sentences, then every table."""
+        return "\n\n".join([self.to_text(), aligned(self.test_lines()), aligned(self.set_lines())])
+
+    def to_text(self) -> str:
+        """Sentences, deviations and whiteness."""
+        return "\n\n".join(["\n".join(self.verdict), aligned(self.scatter_lines()), aligned(self.whiteness_lines())])
+
+    def scatter_lines(self) -> list[Sequence[str]]:
+        """Deviations, header first."""
+        lines: list[Sequence[str]] = [("parameter", "sigma (10)", "corrected", "drawn", "drawn / (10)")]
+        for row in zip(self.scatter.names, self.scatter.sigma, self.scatter.corrected, self.scatter.drawn, self.scatter.ratio, strict=True):
+            lines.append((row[0], *(f"{x:.3g}" for x in row[1:4]), f"{row[4]:.2f}"))
+        return lines
+
+    def whiteness_lines(self) -> list[Sequence[str]]:
+        """Residuals by joint, header first."""
+        lines: list[Sequence[str]] = [("joint", "rows", "rho_1", "Q", "p", "worth rows", "peak Hz", "half of the power below Hz")]
+        for w in self.whiteness:
+            lines.append(
+                (
+                    w.joint,
+                    str(w.rows),
+                    f"{w.correlation[0]:+.2f}",
+                    f"{w.Q:.4g}",
+                    f"{w.p:.2g}",
+                    f"{w.effective_rows:.0f}",
+                    f"{w.peak:.3g}",
+                    f"{w.half:.3g}",
+                )
+            )
+        return lines
+
+    def test_lines(self) -> list[Sequence[str]]:
+        """F-tests along the trail, header first."""
+        lines: list[Sequence[str]] = [("removed", "sigma_rho ratio", "F", "p", "F of this one", "p of this one")]
+        for t in self.f_tests:
+            name = t.name if t.removed else f"{t.name} (kept)"
+            lines.append((name, f"{t.ratio:.5f}", f"{t.F:.3g}", f"{t.p:.2g}", f"{t.F_step:.3g}", f"{t.p_step:.2g}"))
+        return lines
+
+    def set_lines(self) -> list[Sequence[str]]:
+        """Sets by threshold, header first."""
+        lines: list[Sequence[str]] = [("threshold", "parameters", "against the set used")]
+        return [*lines, *((f"{threshold:g}", str(count), " ".join(names) or "the same") for threshold, count, names in self.sets)]
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "verdict": self.verdict,
+            "scatter": {**vars(self.scatter), "ratio": self.scatter.ratio},
+            "whiteness": [{**vars(w), "white": w.white} for w in self.whiteness],
+            "f_tests": self.f_tests,
+            "kept_by_f_test": self.kept_by_f_test,
+            "sets": [{"threshold": threshold, "count": count, "difference": names} for threshold, count, names in self.sets],
+        }
+
+
+def trust(observation: Observation | Reduction, settings: EstimateSettings, essential: Essential, comparison: Comparison) -> Trust:
+    """Checks of the essential parameters found on `observation` by the linear method of `settings`, or the companion of one that is not linear.
+
+    comparison : the residuals that are judged.
+    """
+    seen = whiteness(comparison, observation.rate)
+    return Trust(
+        scatter=scatter(observation, settings, essential.estimate),
+        whiteness=seen,
+        f_tests=f_tests(essential, effective_share(seen)),
+        sets=sets(essential),
+        all_count=len(essential.all_parameters.names),
+    )
+
+
+def scatter(
+    observation: Observation | Reduction, settings: EstimateSettings, fit: Estimate, *, runs: int = RUNS, seed: int = SEED
+) -> Scatter:
+    """Deviations of `fit` by `runs` draws of its blocks of residuals; weights stay."""
+    system = linear_system(observation, linear_companion(settings)).select(fit.names)
+    length = float(fit.settings["residual_block"])
+    grams = block_grams(system, length)
+    K = len(grams)
+    drawn = np.full(len(fit.names), np.nan)
+    if K > 1 and fit.status == "ok":
+        counts = np.random.default_rng(seed).multinomial(K, np.full(K, 1 / K), size=runs)
+        drawn = np.std([_solved(np.tensordot(count, grams, axes=1)) for count in counts.astype(float)], axis=0, ddof=1)
+    return Scatter(fit.names, fit.sigma, fit.sigma_corrected, drawn, K, length, runs, seed)
+
+
+def block_grams(system: System, length: float) -> Array:
+    """Gram matrix of the weighted [W Y] of every block of residuals, shape (K, b + 1, b + 1)."""
+    observation = system.observation.columns(system.names)
+    b = len(system.names)
+    weights = 1 / np.array(system.scales)
+    if isinstance(observation, Reduction):
+        found: dict[tuple[int, int], Array] = {}
+        for segment in observation.segments:
+            gram = found.setdefault((segment.record, segment.block), np.zeros((b + 1, b + 1)))
+            for joint, weight in zip(segment.joints, weights, strict=True):
+                columns = [*joint.columns, b]
+                gram[np.ix_(columns, columns)] += weight**2 * joint.R.T @ joint.R
+        return np.array([gram for gram in found.values() if gram.any()])
+    A = np.column_stack([observation.W, observation.Y])
+    A = whitened(A, system.whitener) if system.whitener is not None else A * np.repeat(weights, observation.rows)[:, None]
+    blocks = block_of_rows(observation, length)
+    return np.array([A[blocks == k].T @ A[blocks == k] for k in range(int(blocks.max()) + 1)])
+
+
+def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
+    """Tests along the trail; share : rows that count over rows."""
+    r, b = essential.all_parameters.rows, len(essential.all_parameters.names)
+    tests = []
+    before = 1.0  # S over S_0
+    for q, step in enumerate(essential.trail, start=1):
+        S = step.ratio**2 * (r - b + q) / max(r - b, 1)
+        free = max(share * r - b, 1.0)
+        F, F_step = (S - 1) / q * free, (S - before) / before * (free + q - 1)
+        tests.append(
+            FTest(
+                step.name,
+                step.ratio,
+                F,
+                float(fdtrc(q, free, max(F, 0))),
+                F_step,
+                float(fdtrc(1, free + q - 1, max(F_step, 0))),
+                step.removed,
+            )
+        )
+        before = S
+    return tuple(tests)
+
+
+def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]:
+    """By threshold: number of parameters, and what differs from the set used."""
+    steps = [*essential.trail, *essential.further]
+    names = essential.all_parameters.names
+    found = []
+    for threshold, count in essential.counts.items():
+        gone = [step.name for step in steps[: len(names) - count]]
+        differs = [f"-{name}" for name in gone if name in essential.names] + [f"+{name}" for name in essential.removed if name not in gone]
+        found.append((threshold, count, tuple(differs)))
+    return tuple(found)
+
+
+def _solved(gram: Array) -> Array:
+    """X of one draw, shape (b,), columns scaled."""
+    A, y = gram[:-1, :-1], gram[:-1, -1]
+    D = 1 / np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
+    return np.asarray(D * np.linalg.lstsq(A * np.outer(D, D), D * y, rcond=None)[0])

@@ -1,0 +1,284 @@
+"""Does the model predict, and which parameters trade against each other?
+
+    direct comparison    measured Y beside W X, joint by joint (chapter, Fig. 4)
+    cross-validation     fit on one part of the data, predict the others: 100 ||Y_j - W_j X|| / ||Y_j|| for every joint
+    weak directions      parameters whose errors are correlated, eq. (10), and the combinations that W hardly sees
+
+Errors are reported per joint since a wrong wrist hides in a total that the shoulder dominates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from runtime.errors import InputError
+from runtime.estimators import estimate, linear_companion, linear_system, point_estimate
+from runtime.estimators.estimate import Estimate, aligned, json_text
+from runtime.estimators.solution import unit_columns
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.observation.reduction import Reduction, Window
+from runtime.settings.study import EstimateSettings
+
+Array = np.ndarray
+
+CORRELATION = 0.9
+"""|correlation| of two estimates above which they are reported to trade against each other."""
+PARTICIPATION = 0.3
+"""Entries of a singular vector below this fraction of its largest are not named."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointComparison:
+    """One joint: t in s, measured and predicted torque in N m (N), shape (N_j,) each; relative error in %."""
+
+    joint: str
+    t: Array
+    measured: Array
+    predicted: Array
+
+    @property
+    def error(self) -> Array:
+        """Measured minus predicted, shape (N_j,)."""
+        return np.asarray(self.measured - self.predicted)
+
+    @property
+    def relative_error(self) -> float:
+        """100 ||measured - predicted|| / ||measured||, in %."""
+        return _percent(self.error, self.measured)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Measured and predicted torques of every joint."""
+
+    joints: tuple[JointComparison, ...]
+
+    def __iter__(self) -> Iterator[JointComparison]:
+        return iter(self.joints)
+
+    @property
+    def relative_error(self) -> float:
+        """100 ||Y - W X|| / ||Y|| over all joints, in %."""
+        return _percent(np.concatenate([j.error for j in self.joints]), np.concatenate([j.measured for j in self.joints]))
+
+
+def predicted_torque(observation: Observation, fit: Estimate) -> Array:
+    """W X, shape (r,), with the columns of the Estimate."""
+    missing = [name for name in fit.names if name not in observation.names]
+    if missing:
+        raise InputError(f"the observation has no columns {', '.join(missing)}; it has {', '.join(observation.names)}")
+    columns = [observation.names.index(name) for name in fit.names]
+    return np.asarray(observation.W[:, columns] @ fit.X)
+
+
+def direct_comparison(observation: Observation, fit: Estimate) -> Comparison:
+    """Measured beside predicted torques, at the instants of the observation."""
+    predicted = predicted_torque(observation, fit)
+    parts = []
+    for j in range(observation.n):
+        rows = observation.joint(j)
+        label = fit.per_joint[j].joint if len(fit.per_joint) == observation.n else str(j + 1)
+        parts.append(JointComparison(label, observation.t[rows], observation.Y[rows], predicted[rows]))
+    return Comparison(tuple(parts))
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Error of one set of columns on one part: in % in total and per joint; `fitted` marks the part that gave the parameters."""
+
+    part: str
+    columns: str
+    count: int
+    fitted: bool
+    relative_error: float
+    per_joint: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """Predictions for every part and every set of columns; joints are their labels."""
+
+    joints: tuple[str, ...]
+    predictions: tuple[Prediction, ...]
+
+    def __str__(self) -> str:
+        return self.to_table()
+
+    def to_table(self) -> str:
+        """One line per part and set of columns, errors in %."""
+        lines: list[Sequence[str]] = [("part", "columns", "use", "total %", *(f"joint {j} %" for j in self.joints))]
+        for p in self.predictions:
+            errors = [f"{value:.3f}" for value in (p.relative_error, *p.per_joint)]
+            lines.append((p.part, f"{p.columns} ({p.count})", "fitted" if p.fitted else "predicted", *errors))
+        return aligned(lines)
+
+    def to_json(self) -> str:
+        """JSON text of the predictions."""
+        return json_text(self.summary())
+
+    def summary(self) -> dict[str, Any]:
+        """What `to_json` writes, as a mapping."""
+        return {"schema": 1, "joints": self.joints, "predictions": self.predictions}
+
+
+def prediction_errors(observation: Observation | Reduction, fit: Estimate) -> tuple[float, tuple[float, ...]]:
+    """100 ||Y - W X|| / ||Y||, in %, over all joints and by joint."""
+    if isinstance(observation, Observation):
+        compared = direct_comparison(observation, fit)
+        return compared.relative_error, tuple(joint.relative_error for joint in compared)
+    joints = observation.columns(fit.names).factor.joints
+    errors, measured = (np.array(x) for x in ([j.residual_norm(fit.X) for j in joints], [j.measured_norm for j in joints]))
+    return _percent(errors, measured), tuple(_percent(e, m) for e, m in zip(errors, measured, strict=True))
+
+
+def cross_validation(
+    fit: Observation | Reduction,
+    predict: Mapping[str, Observation | Reduction],
+    settings: EstimateSettings | None = None,
+    *,
+    essential: Sequence[str] | None = None,
+    name: str = "fit",
+    model: GeneratedModel | None = None,
+) -> CrossValidation:
+    """Fit on one observation, predict others, with all columns and with the essential ones.
+
+    predict : observations by label; essential : names found before, on the whole record or on the fitted part.   model : for methods that need it.
+    """
+    settings = point_estimate(settings or EstimateSettings())
+    every = fit.names if settings.columns == "all" else settings.columns
+    choices = {"all": tuple(every)} | ({} if essential is None else {"essential": tuple(essential)})
+    predictions = []
+    labels: tuple[str, ...] = ()
+    for columns, names in choices.items():
+        found = estimate(fit.columns(names), EstimateSettings(settings.method, settings.weights, "all", settings.options), model=model)
+        for part, seen in {name: fit, **predict}.items():
+            labels = tuple(joint.joint for joint in found.per_joint)
+            total, errors = prediction_errors(seen, found)
+            predictions.append(Prediction(part, columns, len(names), seen is fit, total, errors))
+    return CrossValidation(labels, tuple(predictions))
+
+
+def split_validation(
+    observation: Observation | Reduction,
+    windows: Sequence[Window],
+    settings: EstimateSettings | None = None,
+    *,
+    essential: Sequence[str] | None = None,
+    model: GeneratedModel | None = None,
+) -> CrossValidation:
+    """Cross-validation between windows in s of one record: the first is fitted, the others are predicted."""
+    if len(windows) < 2:
+        raise InputError(f"{len(windows)} window; expected at least two, the first to fit, the others to predict (validate.split)")
+    labels = [f"[{'' if t0 is None else f'{t0:g}'}, {'' if t1 is None else f'{t1:g}'}] s" for t0, t1 in windows]
+    parts = {label: observation.between(t0, t1) for label, (t0, t1) in zip(labels, windows, strict=True)}
+    first = labels[0]
+    others = {label: part for label, part in parts.items() if label != first}
+    return cross_validation(parts[first], others, settings, essential=essential, name=first, model=model)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two parameters and the correlation of their estimates."""
+
+    first: str
+    second: str
+    correlation: float
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A combination of parameters that moves W X little.
+
+    ratio : s_i / s_1 of W with unit columns.   weights : entries of the singular vector (unit columns), largest first.
+    """
+
+    ratio: float
+    weights: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class WeakDirections:
+    """What the record separates badly: correlated pairs, the groups they form, the smallest singular directions."""
+
+    pairs: tuple[Pair, ...]
+    groups: tuple[tuple[str, ...], ...]
+    directions: tuple[Direction, ...]
+    threshold: float
+
+    def __str__(self) -> str:
+        return self.to_table()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One sentence per group: which parameters trade against each other, how strongly, and what to do."""
+        return tuple(self._warning(group) for group in self.groups)
+
+    def _warning(self, group: Sequence[str]) -> str:
+        strongest = max((p for p in self.pairs if p.first in group), key=lambda p: abs(p.correlation))
+        between = f"{strongest.first}, {strongest.second} " if len(group) > 2 else ""
+        return (
+            f"{' and '.join([', '.join(group[:-1]), group[-1]])} trade against each other on this record (correlation {between}"
+            f"{strongest.correlation:+.2f}): what they do together is known better than each value. Set one of them to a value known otherwise, or "
+            "record a motion that tells them apart (symgen excite)."
+        )
+
+    def to_table(self) -> str:
+        """Groups, pairs and directions as text."""
+        lines: list[Sequence[str]] = [("pair", "correlation")]
+        lines += [(f"{p.first} {p.second}", f"{p.correlation:+.4f}") for p in self.pairs]
+        weak: list[Sequence[str]] = [("singular value ratio", "direction (unit columns)")]
+        weak += [(f"{d.ratio:.3e}", " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items())) for d in self.directions]
+        head = f"groups with |correlation| above {self.threshold}: {'; '.join(', '.join(g) for g in self.groups) or 'none'}"
+        return "\n\n".join([head, aligned(lines), aligned(weak)])
+
+    def to_json(self) -> str:
+        """JSON text of pairs, groups and directions."""
+        return json_text(
+            {"schema": 1, "threshold": self.threshold, "pairs": self.pairs, "groups": self.groups, "directions": self.directions}
+        )
+
+
+def weak_directions(
+    observation: Observation | Reduction, settings: EstimateSettings | None = None, *, threshold: float = CORRELATION, count: int = 3
+) -> WeakDirections:
+    """Parameters that trade against each other on this observation.
+
+    threshold : smallest |correlation| reported.   count : number of singular directions.
+    """
+    system = linear_system(observation, linear_companion(settings or EstimateSettings()))
+    names = system.names
+    R, _ = unit_columns(system.weighted.R11)
+    _, s, Vt = np.linalg.svd(R)
+    T = system.solve().T
+    norms = np.linalg.norm(T, axis=1)
+    correlation = (T @ T.T) / np.outer(norms, norms).clip(min=np.finfo(float).tiny)
+    linked = np.abs(correlation) > threshold
+    np.fill_diagonal(linked, False)
+    pairs = [Pair(names[i], names[k], float(correlation[i, k])) for i, k in zip(*np.nonzero(np.triu(linked)), strict=True)]
+    components, label = connected_components(linked, directed=False)
+    groups = [tuple(names[i] for i in np.flatnonzero(label == c)) for c in range(components)]
+    weakest = range(len(names) - 1, max(len(names) - 1 - count, -1), -1)
+    return WeakDirections(
+        pairs=tuple(sorted(pairs, key=lambda pair: -abs(pair.correlation))),
+        groups=tuple(group for group in groups if len(group) > 1),
+        directions=tuple(Direction(float(s[i] / s[0]), _named(Vt[i], names)) for i in weakest),
+        threshold=threshold,
+    )
+
+
+def _named(v: Array, names: Sequence[str]) -> dict[str, float]:
+    """Entries of a singular vector worth a name, largest first, the largest positive."""
+    order = np.argsort(-np.abs(v), kind="stable")
+    v = v * np.sign(v[order[0]])
+    return {names[i]: float(v[i]) for i in order if abs(v[i]) >= PARTICIPATION * abs(v[order[0]])}
+
+
+def _percent(error: Array, measured: Array) -> float:
+    norm = float(np.linalg.norm(measured))
+    return 100 * float(np.linalg.norm(error)) / norm if norm > 0 else float("nan")

@@ -1,1 +1,0 @@
-"""Reading records and data sets: one format per file."""

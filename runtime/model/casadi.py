@@ -1,0 +1,69 @@
+"""The CasADi module of a model at the border: found beside the NumPy module, checked, and of the same robot file.
+
+    symbolic = load_symbolic("tx40")        # generated/tx40_casadi.py
+
+It is parsed before it runs (`runtime.model.loading`) and imports casadi itself; nothing here does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol, cast
+
+from runtime.errors import ModelError
+from runtime.model.generated import GeneratedModel, sibling_file
+from runtime.model.loading import module_of
+
+CONSTANTS = ("NAME", "JOINTS", "BASE_PARAMETERS", "CONSTANTS", "LIMITS", "VALUES", "SOURCE_SHA256")
+FUNCTIONS = {  # columns read, before the constants
+    "regressor": ("q", "qd", "qdd"),
+    "inverse_dynamics": ("q", "qd", "qdd", "X"),
+    "inertia_matrix": ("q", "X"),
+    "bias": ("q", "qd", "X"),
+    "gravity": ("q", "X"),
+    "forward_dynamics": ("q", "qd", "tau", "X"),
+}
+
+
+class SymbolicModel(Protocol):
+    """What `runtime` uses of a CasADi module: ca.Function objects of columns, called by name; n joints, b base parameters."""
+
+    NAME: str
+    JOINTS: tuple[int, ...]
+    BASE_PARAMETERS: tuple[str, ...]
+    CONSTANTS: Mapping[str, float]
+    LIMITS: Mapping[str, Any]
+    VALUES: Mapping[str, float]
+    SOURCE_SHA256: str
+    regressor: Callable[..., Any]  # D (n, b) of q, qd, qdd
+    inverse_dynamics: Callable[..., Any]  # GAM of q, qd, qdd, X
+    inertia_matrix: Callable[..., Any]  # A of q, X
+    bias: Callable[..., Any]  # GAM of q, qd, X
+    gravity: Callable[..., Any]  # GAM of q, X
+    forward_dynamics: Callable[..., Any]  # qdd of q, qd, tau, X
+
+
+def load_symbolic(model: str | Path | ModuleType, *, of: GeneratedModel | None = None, folder: Path | None = None) -> SymbolicModel:
+    """The CasADi model of a name (generated/NAME_casadi.py), of a path, or of an imported module; ModelError where it is no such model.
+
+    of : the NumPy model that it must belong to.   folder : where names are looked up; default: ./generated.
+    """
+    if isinstance(model, ModuleType):
+        return _checked(model, of)
+    return _checked(module_of(sibling_file(model, "casadi", title="CasADi", folder=folder)), of)
+
+
+def _checked(module: ModuleType, of: GeneratedModel | None) -> SymbolicModel:
+    missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
+    if missing:
+        raise ModelError(f"no {', '.join(missing)}; expected an emitted CasADi module, emit it again", file=module.__name__)
+    for name, columns in FUNCTIONS.items():
+        function = getattr(module, name)
+        names = list(function.name_in()) if hasattr(function, "name_in") else None
+        if names != [*columns, *module.CONSTANTS]:
+            raise ModelError(f"{name} takes {names}; expected {', '.join([*columns, *module.CONSTANTS])}", file=module.__name__)
+    if of is not None and module.SOURCE_SHA256 != of.SOURCE_SHA256:
+        raise ModelError("NumPy and CasADi module stem from different robot files; emit both again", file=module.__name__)
+    return cast(SymbolicModel, module)

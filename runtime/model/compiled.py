@@ -1,0 +1,250 @@
+"""The C file of a model, compiled on first use and called like the NumPy module; without a compiler the NumPy module serves.
+
+    model = compiled_model(load_model("tx40"))          # generated/tx40.c beside generated/tx40.py
+
+The object lies in a cache that is checked (`runtime.model.compile_cache`). One tile of every function is compared with NumPy.
+
+A C file runs as it is, unlike a module (`runtime.model.loading`): compile only what you emitted yourself.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.model.compile_cache import FallbackWarning, NotCompiledError, cache_folder, shared_object
+from runtime.model.generated import GeneratedModel
+
+Array = np.ndarray
+
+ABI = 2
+TOLERANCE = 1e-10  # of the largest entry: the self-check looks for wrong code, not for rounding
+SHARE = 32 << 20  # bytes of the last cache that one core may count on at most
+STATES = {
+    "regressor": ("q", "qd", "qdd"),
+    "inverse_dynamics": ("q", "qd", "qdd"),
+    "inertia_matrix": ("q",),
+    "bias": ("q", "qd"),
+    "gravity": ("q",),
+}
+
+
+class DynamicModel(GeneratedModel, Protocol):
+    """A generated model with the dynamics that C replaces."""
+
+    inverse_dynamics: Callable[..., Array]
+    inertia_matrix: Callable[..., Array]
+    bias: Callable[..., Array]
+    gravity: Callable[..., Array]
+
+
+def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None) -> GeneratedModel:
+    """`model` with its functions in C, or `model` itself, with a FallbackWarning saying why, where that cannot be had.
+
+    source : the C file; default: beside the file of the model, .c for .py.   cache : folder of the compiled objects.
+    """
+    try:
+        path = source or _beside(model)
+        text = _text(path)
+        library = shared_object(path, text, cache or cache_folder(), lambda found: _opened(found, model))
+        compiled = CompiledModel(cast(DynamicModel, model), library, text)
+        compiled.check()
+        return cast(GeneratedModel, compiled)
+    except (NotCompiledError, OSError) as e:
+        warnings.warn(f"{model.NAME}: NumPy in place of C: {e}", FallbackWarning, stacklevel=2)
+        return model
+
+
+def target_of(model: GeneratedModel) -> str:
+    """What computes: "c" for a compiled model, "numpy" for an emitted module."""
+    return "c" if isinstance(model, CompiledModel) else "numpy"
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The distinct rows of the store S, shape (b, n, N), as a C function, for other C code: S[column, row] = sign U[signal].
+
+    address : of int32_t f(int64_t m, const double *q, const double *qd, const double *qdd, int64_t stride, const double *constants,
+        double *U, int64_t ustride), which fills U[s*ustride + t], t < m, from states of which joint j has m samples from j*stride on and
+        returns 0, or 1 if a pointer is missing or m exceeds ustride. It allocates nothing and may run in many threads.
+    count : number of signals s; those of constant entries are filled too.   tile : samples treated together; m costs as the next multiple.
+    column, row, signal, sign : (entries,), base parameter, joint, signal and +1 or -1 of every entry that is not zero.
+    constant : (entries,), whether no state changes the entry.
+    """
+
+    address: int
+    count: int
+    tile: int
+    column: Array
+    row: Array
+    signal: Array
+    sign: Array
+    constant: Array
+
+
+class CompiledModel:
+    """The API of the generated module; what the C file lacks is that of the module. `signals`: for other C code. `source`: the C file's text."""
+
+    def __init__(self, model: DynamicModel, library: ctypes.CDLL, source: bytes) -> None:
+        self._model, self._library, self.source = model, library, source
+        self.signals = _signals(library, model)
+        self._n, self._b = len(model.JOINTS), len(model.BASE_PARAMETERS)
+        self._large = _large()
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "_model":  # while it is being copied
+            raise AttributeError(name)
+        return getattr(self._model, name)
+
+    @property
+    def module(self) -> GeneratedModel:
+        """The NumPy module."""
+        return cast(GeneratedModel, self._model)
+
+    def regressor(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+        """D, shape (N, n, b): a view on one store of shape (b, n, N)."""
+        D = self._filled_store(q, qd, qdd, out, constants).transpose(2, 1, 0)
+        return cast(Array, D[0]) if np.ndim(q) == 1 else D
+
+    def observation_matrix(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+        """W, shape (n*N, b), rows joint-major, Fortran order: the same store, no copy."""
+        return self._filled_store(q, qd, qdd, out, constants).reshape(self._b, -1).T
+
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, X: Array, **constants: float) -> Array:
+        """Gamma, shape (N, n)."""
+        return self._dynamics("inverse_dynamics", (q, qd, qdd), X, constants, 1)
+
+    def inertia_matrix(self, q: Array, X: Array, **constants: float) -> Array:
+        """A(q), shape (N, n, n)."""
+        return self._dynamics("inertia_matrix", (q,), X, constants, 2)
+
+    def bias(self, q: Array, qd: Array, X: Array, **constants: float) -> Array:
+        """Gamma at qdd = 0, shape (N, n)."""
+        return self._dynamics("bias", (q, qd), X, constants, 1)
+
+    def gravity(self, q: Array, X: Array, **constants: float) -> Array:
+        """Gamma at rest without friction, shape (N, n)."""
+        return self._dynamics("gravity", (q,), X, constants, 1)
+
+    def forward_dynamics(self, q: Array, qd: Array, tau: Array, X: Array, **constants: float) -> Array:
+        """qdd = A(q)**-1 (tau - bias), shape (N, n)."""
+        A, H = self.inertia_matrix(q, X, **constants), self.bias(q, qd, X, **constants)
+        return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+
+    def check(self) -> None:
+        """Raise unless every function agrees with NumPy on a tile and some samples more."""
+        rng = np.random.default_rng(11)
+        states = rng.uniform(-2, 2, (3, 71, self._n))
+        X = rng.uniform(-1, 1, self._b)
+        for name, used in STATES.items():
+            arguments = [*states[: len(used)], *([] if name == "regressor" else [X])]
+            found, expected = (getattr(m, name)(*arguments) for m in (self, self._model))
+            if not np.abs(found - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
+                raise NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
+
+    def _filled_store(self, q: Array, qd: Array, qdd: Array, out: Array | None, constants: Mapping[str, float]) -> Array:
+        states = self._states("regressor", (q, qd, qdd))
+        N = len(states[0])
+        if out is None:
+            out = self._model.store(N)
+        elif not (isinstance(out, cast(Any, self._model).Store) and cast(Any, out).ready and out.shape == (self._b, self._n, N)):
+            raise ValueError(
+                f"out: expected store({N}) of shape {(self._b, self._n, N)}, found {type(out).__name__} of shape {np.shape(out)}"
+            )
+        self._call("regressor", states, constants, out)
+        return out.view(np.ndarray)
+
+    def _dynamics(self, name: str, given: Sequence[Array], X: Array, constants: Mapping[str, float], axes: int) -> Array:
+        states = self._states(name, given)
+        X = np.ascontiguousarray(X, dtype=float)
+        if X.shape != (self._b,):
+            raise InputError(f"{self._model.NAME}: X has shape {X.shape}; expected ({self._b},)")
+        result = np.empty((*[self._n] * axes, len(states[0])))
+        self._call(name, (*states, X), constants, result)
+        result = np.moveaxis(result, -1, 0)
+        return cast(Array, result[0]) if np.ndim(given[0]) == 1 else result
+
+    def _states(self, name: str, given: Sequence[Array]) -> tuple[Array, ...]:
+        """Contiguous (N, n) arrays of one shape: C reads past the end of any other."""
+        states = tuple(np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in given)
+        for label, x in zip(STATES[name], states, strict=True):
+            if x.ndim != 2 or x.shape[1] != self._n or x.shape != states[0].shape:
+                raise InputError(
+                    f"{self._model.NAME}: {label} has shape {x.shape}, q {states[0].shape}; expected (N, {self._n}), the same for all"
+                )
+        return states
+
+    def _call(self, name: str, inputs: Sequence[Array], constants: Mapping[str, float], result: Array) -> None:
+        unknown = set(constants) - set(self._model.CONSTANTS)
+        if unknown:
+            raise TypeError(
+                f"{name}() got unexpected keywords {sorted(unknown)}; constants are {', '.join(self._model.CONSTANTS) or 'none'}"
+            )
+        values = np.array([float({**self._model.CONSTANTS, **constants}[c]) for c in self._model.CONSTANTS] or [0.0])
+        if not (result.flags.c_contiguous and result.flags.aligned and result.flags.writeable and result.dtype == np.float64):
+            raise InputError(f"{self._model.NAME}: the store is not a writeable float64 array in C order")
+        stream = result.nbytes > self._large
+        pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*inputs, values, result)]
+        status = getattr(self._library, f"{self._model.NAME}_{name}")(ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream))
+        if status:
+            raise InputError(f"{self._model.NAME}: {name} in C refused its arguments with {status}")
+
+
+def _signals(library: ctypes.CDLL, model: GeneratedModel) -> Signals:
+    tile, count, entries = (
+        ctypes.c_int32.in_dll(library, f"{model.NAME}_{name}").value for name in ("tile", "signal_count", "entry_count")
+    )
+    place, signal, sign = np.array((ctypes.c_int32 * 3 * entries).in_dll(library, f"{model.NAME}_entries"), dtype=np.intp).reshape(-1, 3).T
+    column, row = np.divmod(place, len(model.JOINTS))
+    address = ctypes.cast(getattr(library, f"{model.NAME}_signals"), ctypes.c_void_p).value
+    constant = np.arange(entries) >= ctypes.c_int32.in_dll(library, f"{model.NAME}_varying_count").value
+    return Signals(cast(int, address), count, tile, column, row, signal, sign, constant)
+
+
+def _large() -> int:
+    """Bytes beyond which a result should not pass through the caches: a third of the last one, of which a large one is shared by many cores."""
+    try:
+        size = os.sysconf("SC_LEVEL3_CACHE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        size = 0
+    return min(size if size > 0 else SHARE, SHARE) // 3
+
+
+def _beside(model: GeneratedModel) -> Path:
+    file = getattr(model, "__file__", None)
+    if file is None:
+        raise NotCompiledError("the model was not loaded from a file, and no C file is given")
+    return Path(file).with_suffix(".c")
+
+
+def _text(path: Path) -> bytes:
+    if not path.is_file():
+        raise NotCompiledError(
+            f"there is no {path}; `symgen generate {path.stem} --target numpy,c` writes it, except where loops need iteration"
+        )
+    return path.read_bytes()
+
+
+def _opened(path: Path, model: GeneratedModel) -> ctypes.CDLL:
+    """The object, if it speaks this ABI and stems from the robot file of the model."""
+    library = ctypes.CDLL(str(path))
+    try:
+        abi, sha256 = getattr(library, f"{model.NAME}_abi"), getattr(library, f"{model.NAME}_source_sha256")
+        for name in STATES:
+            getattr(library, f"{model.NAME}_{name}").restype = ctypes.c_int32
+    except AttributeError as e:
+        raise NotCompiledError(f"the C file is not that of {model.NAME}: {e}") from e
+    sha256.restype, abi.restype = ctypes.c_char_p, ctypes.c_int32
+    if abi() != ABI:
+        raise NotCompiledError(f"the C file has interface {abi()}, expected {ABI}; emit it again")
+    if sha256().decode() != model.SOURCE_SHA256:
+        raise NotCompiledError("C file and module stem from different robot files; emit both again")
+    return library

@@ -1,0 +1,145 @@
+"""The border to emitted modules: what they offer, how one is found and checked, and checks of the states given to it.
+
+A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` reads generated/tx40.py of the current folder. A
+module given by path is parsed before it runs (`runtime.model.loading`), so that a file received from elsewhere cannot act behind its formulas.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol, cast
+
+import numpy as np
+
+from runtime.errors import InputError, ModelError
+from runtime.model.drives import Drives
+from runtime.model.loading import module_of
+
+Array = np.ndarray
+
+FOLDER = Path("generated")  # of the current folder
+CONSTANTS = ("NAME", "JOINTS", "BASE_PARAMETERS", "STRUCTURE", "DRIVES", "LIMITS", "VALUES", "CONSTANTS", "SOURCE_SHA256")
+FUNCTIONS = ("store", "regressor", "observation_matrix")  # what identification needs; `require` checks others where they are used
+
+
+class GeneratedModel(Protocol):
+    """What `runtime` uses of an emitted module: n joints, b base parameters, q, qd, qdd of shape (N, n)."""
+
+    NAME: str
+    JOINTS: tuple[int, ...]
+    BASE_PARAMETERS: tuple[str, ...]
+    STRUCTURE: Array  # bool (b, n): False where the entry is identically zero
+    DRIVES: Mapping[str, Any] | None
+    LIMITS: Mapping[str, Any]
+    VALUES: Mapping[str, float]
+    CONSTANTS: Mapping[str, float]
+    SOURCE_SHA256: str
+
+    def store(self, N: int) -> Array:
+        """Workspace of shape (b, n, N) for `out`, structural zeros written."""
+
+    def regressor(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+        """D, shape (N, n, b), eq. (5)."""
+
+    def observation_matrix(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+        """W, shape (n*N, b), rows joint-major, Fortran order, eq. (6)."""
+
+
+def load_model(model: str | Path | ModuleType, *, folder: Path | None = None) -> GeneratedModel:
+    """The model of a name (generated/NAME.py), of a path to a .py file, or of an imported module, checked before use.
+
+    folder : where names are looked up; default: ./generated.
+    """
+    if isinstance(model, ModuleType):
+        return checked_model(model)
+    path = Path(model)
+    if isinstance(model, str) and re.fullmatch(r"\w+", model):
+        path = (folder or FOLDER) / f"{model}.py"
+    if not path.is_file():
+        present = sorted(p.stem for p in path.parent.glob("*.py") if p.stem != "__init__") if path.parent.is_dir() else []
+        raise ModelError(
+            f"no emitted model {path}; {path.parent} holds {', '.join(present) or 'none'}: emit it with `symgen generate {path.stem}`"
+        )
+    return checked_model(module_of(path))
+
+
+def checked_model(module: ModuleType) -> GeneratedModel:
+    """The module itself if it is an emitted model with n, b and shapes that agree; ModelError otherwise."""
+    label = module.__name__
+    missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
+    if missing:
+        raise ModelError(f"no {', '.join(missing)}; expected an emitted model, emit it again", file=label)
+    model = cast(GeneratedModel, module)
+    _check_names(model, label)
+    require(model, *FUNCTIONS)
+    n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
+    if n == 0 or b == 0 or len(set(model.BASE_PARAMETERS)) != b:
+        raise ModelError(
+            f"{n} joints and {b} base parameters {model.BASE_PARAMETERS}; expected at least one of each, names once", file=label
+        )
+    structure = np.asarray(model.STRUCTURE)
+    if structure.shape != (b, n) or structure.dtype != np.bool_:
+        raise ModelError(f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, n)}, base parameters by joints", file=label)
+    if model.DRIVES is not None and Drives.from_mapping(model.DRIVES).n != n:
+        raise ModelError(f"DRIVES of {len(model.DRIVES['ratio'])} joints; expected {n}", file=label)
+    _check_store(model, b, n, label)
+    return model
+
+
+def sibling_file(model: str | Path, target: str, *, title: str, folder: Path | None = None) -> Path:
+    """The module of another target: of a name, FOLDER/NAME_target.py, or of a path; ModelError, which says how to emit it, where there is none."""
+    path, ending = Path(model), f"_{target}"
+    if isinstance(model, str) and re.fullmatch(r"\w+", model):
+        path = (folder or FOLDER) / f"{model.removesuffix(ending)}{ending}.py"
+    if not path.is_file():
+        robot = path.stem.removesuffix(ending)
+        raise ModelError(f"no {title} model {path}; emit it with `symgen generate {robot} --target numpy,{target} -o {path.parent}`")
+    return path
+
+
+def require(model: GeneratedModel, *functions: str) -> None:
+    """Raise ModelError unless the model offers all the named functions."""
+    missing = [name for name in functions if not callable(getattr(model, name, None))]
+    if missing:
+        raise ModelError(f"no function {', '.join(missing)}; emit the model again with the target that has them", file=model.NAME)
+
+
+def _check_names(model: GeneratedModel, label: str) -> None:
+    """Names enter messages, tables, file names and symbols of compiled files: identifiers, and joints whole numbers."""
+    names = (model.NAME, *model.BASE_PARAMETERS)
+    if wrong := [name for name in names if not (isinstance(name, str) and re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII))]:
+        raise ModelError(f"NAME or BASE_PARAMETERS hold {wrong[0]!r:.60}; expected identifiers", file=label)
+    if strange := [j for j in model.JOINTS if type(j) is not int or j < 1]:
+        raise ModelError(f"JOINTS hold {strange[0]!r:.60}; expected numbers of joints", file=label)
+
+
+def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
+    """Two samples at rest through `store` and `observation_matrix`."""
+    N = 2
+    rest = np.zeros((N, n))
+    try:
+        shape = np.shape(model.store(N))
+        with np.errstate(all="ignore"):
+            shapes = np.shape(model.regressor(rest, rest, rest)), np.shape(model.observation_matrix(rest, rest, rest))
+    except Exception as e:  # whatever a broken file raises becomes one kind of error
+        raise ModelError(f"fails on two samples at rest with {type(e).__name__}: {e}; emit it again", file=label) from e
+    if shape != (b, n, N):
+        raise ModelError(f"store({N}) has shape {shape}; expected {(b, n, N)}", file=label)
+    if shapes != ((N, n, b), (n * N, b)):
+        raise ModelError(f"regressor {shapes[0]}, observation_matrix {shapes[1]}; expected {(N, n, b)} and {(n * N, b)}", file=label)
+
+
+def check_states(model: GeneratedModel, q: Array, qd: Array, qdd: Array) -> None:
+    """Raise ValueError unless q, qd, qdd are real arrays of one shape (N, n), n the joints of the model."""
+    n = len(model.JOINTS)
+    for name, x in (("q", q), ("qd", qd), ("qdd", qdd)):
+        x = np.asarray(x)
+        if x.ndim not in (1, 2) or x.shape[-1] != n or x.shape != np.shape(q):
+            raise InputError(
+                f"{model.NAME}: {name} has shape {x.shape}, q {np.shape(q)}; expected (N, {n}) or ({n},), the same for q, qd and qdd"
+            )
+        if not np.issubdtype(x.dtype, np.floating) and not np.issubdtype(x.dtype, np.integer):
+            raise InputError(f"{model.NAME}: {name} has dtype {x.dtype}; expected real numbers")

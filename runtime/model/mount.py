@@ -1,0 +1,132 @@
+"""A tool or load of known inertia on a link, or on a frame fixed to one (sigma 2): its ten parameters in either frame, and what it adds to X.
+
+With P the pseudo-inertia of a body (`runtime.estimators.physical`), about and along the axes of frame f, and lTf the pose of f in the frame of its link l,
+
+    P_l = lTf P_f lTf',            hence chi_l = A(lTf) chi_f, A of shape (10, 10),
+    X of the robot with the load = X + K_l chi_l,     K_l the columns of K = dX/dchi of link l.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.estimators.physical import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
+from runtime.model.generated import GeneratedModel, require
+
+Array = np.ndarray
+
+RIGID = 1e-9  # largest change of a pose, against the size of the robot, of two frames on one body
+
+
+@dataclass(frozen=True, eq=False)
+class Mount:
+    """Where a load is fixed: on link `link`, its parameters meant at frame `frame`, whose pose in the frame of the link is T, shape (4, 4)."""
+
+    link: int
+    frame: int
+    T: Array
+
+    @property
+    def place(self) -> str:
+        """In words."""
+        return f"link {self.link}" if self.frame == self.link else f"frame {self.frame} of link {self.link}"
+
+    @property
+    def action(self) -> Array:
+        """A, shape (10, 10): ten parameters at `frame` to those at the frame of the link, in the order of INERTIAL."""
+        return np.column_stack([ten_parameters(self.T @ pseudo_inertia(unit) @ self.T.T) for unit in np.eye(10)])
+
+    def columns(self, physical: PhysicalModel) -> Array:
+        """dX/dchi of the load at `frame`, shape (b, 10)."""
+        own = physical.K[:, physical.link(self.link)]
+        if self.frame == self.link:
+            return own
+        moved = own @ self.action
+        return np.where(np.abs(moved) > RIGID * np.abs(moved).max(axis=1, keepdims=True), moved, 0.0)
+
+
+def mount(model: GeneratedModel, frame: int | None = None, link: int | None = None, constants: Mapping[str, float] | None = None) -> Mount:
+    """The link that carries a frame, and the pose of the frame in it.
+
+    Parameters
+    ----------
+    frame : any declared frame; default: that of the link.   link : default: the one that carries the frame, or the last link with inertia.
+    constants : geometry other than that of the robot file, as for `frame_poses`.
+
+    Raises
+    ------
+    InputError : no such frame or link, or a frame that no link with inertia carries.
+    """
+    links = physical_model(model).links
+    link = links[-1] if link is None and frame is None else link
+    if link is not None and link not in links:
+        raise InputError(f"no link {link} with inertia; links are {', '.join(map(str, links))}")
+    if frame is None or frame == link:
+        assert link is not None  # one of both is given
+        return Mount(link, link, np.eye(4))
+    require(model, "frame_poses")
+    rng = np.random.default_rng(0)
+    T: Array = model.frame_poses(rng.uniform(-1.0, 1.0, (8, len(model.JOINTS))), **(constants or {}))  # type: ignore[attr-defined]
+    if not 1 <= frame <= T.shape[1]:
+        raise InputError(f"no frame {frame}; {model.NAME} has frames 1 to {T.shape[1]}")
+    seen = {j: np.linalg.solve(T[:, j - 1], T[:, frame - 1]) for j in links}
+    size = max(1.0, float(np.abs(T).max()))
+    carrying = [j for j, pose in seen.items() if np.ptp(pose, axis=0).max() < RIGID * size]
+    if link is not None and link not in carrying:
+        raise InputError(f"frame {frame} is not fixed to link {link}; it is fixed to {_named(carrying)}")
+    if not carrying:
+        raise InputError(f"frame {frame} is fixed to no link with inertia; links are {', '.join(map(str, links))}")
+    link = link or (frame if frame in carrying else carrying[-1])
+    return Mount(link, frame, np.eye(4) if link == frame else seen[link].mean(axis=0))
+
+
+def load_effect(
+    model: GeneratedModel, load: Mapping[str, float], *, frame: int | None = None, link: int | None = None, **constants: float
+) -> Array:
+    """What a known load adds to the base parameters, shape (b,) in the order of BASE_PARAMETERS: X + load_effect(...) is the robot with it.
+
+    load : of XX XY XZ YY YZ ZZ MX MY MZ M, at frame `frame` (default: that of the link), SI; what is left out is zero.
+    """
+    return np.asarray(mount(model, frame, link, constants).columns(physical_model(model, constants)) @ load_vector(load))
+
+
+def load_vector(load: Mapping[str, float]) -> Array:
+    """The ten parameters in the order of INERTIAL; InputError for another name."""
+    if unknown := [name for name in load if name not in INERTIAL]:
+        raise InputError(f"unknown parameter {', '.join(unknown)} of a load; expected some of {', '.join(INERTIAL)}")
+    return np.array([float(load.get(name, 0.0)) for name in INERTIAL])
+
+
+def load_of_body(mass: float, centre: Any, inertia: Any = None, rotation: Any = None) -> dict[str, float]:
+    """Parameters of a body from its data sheet: about the origin and along the axes of the frame it is mounted on.
+
+    Parameters
+    ----------
+    mass : kg.   centre : of mass in that frame, shape (3,), m.
+    inertia : tensor about the centre of mass, shape (3, 3), kg m^2 (products as tensor elements, Ixy = -integral x y dm); default: a point.
+    rotation : orientation of the axes of `inertia` in that frame, shape (3, 3); default: the same axes.
+    """
+    c, I = np.asarray(centre, dtype=float), np.zeros((3, 3)) if inertia is None else np.asarray(inertia, dtype=float)
+    R = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
+    if c.shape != (3,) or I.shape != (3, 3) or R.shape != (3, 3) or not np.allclose(I, I.T):
+        raise InputError(f"centre {c.shape}, inertia {I.shape}, rotation {R.shape}; expected (3,), a symmetric (3, 3), (3, 3)")
+    if not mass > 0:
+        raise InputError(f"mass {mass} kg; expected a positive one")
+    J = R @ I @ R.T + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    return dict(zip(INERTIAL, map(float, (*J[np.triu_indices(3)], *(mass * c), mass)), strict=True))
+
+
+def ten_parameters(P: Array) -> Array:
+    """The ten parameters of a pseudo-inertia, in the order of INERTIAL: J = tr(S) 1 - S of its matrix S of second moments."""
+    S = P[:3, :3]
+    J = np.trace(S) * np.eye(3) - S
+    return np.array([*J[np.triu_indices(3)], *P[:3, 3], P[3, 3]])
+
+
+def _named(links: list[int]) -> str:
+    return f"link {', '.join(map(str, links))}" if links else "no link with inertia"

@@ -1,0 +1,1 @@
+"""What moves the arm: references, control laws, and the simulated closed loop."""

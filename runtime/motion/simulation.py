@@ -1,0 +1,317 @@
+"""Closed-loop simulation on the emitted CasADi model.
+
+    found = simulate(model, X, controller, reference)              # one run
+    simulator = Simulator(model, controller)                       # many: compiled once
+    found = simulator.run(X, reference, g=g, ideal=True)           # exact states, no noise, no steps
+
+Torque is held between the ticks of the controller; between them Runge-Kutta of order 4 (or CVODES), with dry friction that holds at rest and only
+takes energy. Substeps are at most `pole_step` over the fastest pole of the loop. Before a run the inertia matrix must be positive definite and
+the sampled loop stable along the reference: what is not raises SimulationError, which says where, and what to try.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy.signal import butter, lfilter
+
+from runtime.errors import InputError, SettingsError
+from runtime.model.casadi import SymbolicModel, load_symbolic
+from runtime.model.generated import GeneratedModel
+from runtime.motion.control_law import ControlLaw, continuous_pole, control_law, discrete_poles
+from runtime.motion.controller_tick import Plan, blocks, compiled, tick_function
+from runtime.motion.dry_friction import REST, DryFriction, dry_friction
+from runtime.motion.reference import Reference
+from runtime.motion.result import Sensitivity, Simulation, SimulationError
+from runtime.motion.sensitivity import tangent_along, tangent_function
+from runtime.settings.controller import Controller
+
+Array = np.ndarray
+
+POINTS = 12  # of the reference where inertia and poles are looked at
+BLOCK, TANGENT_BLOCK = 250, 25  # ticks in one call
+UNSTABLE = 1 + 1e-6  # modulus of a discrete pole
+MOST_SUBSTEPS = 200
+FAR = 1e3  # times the range of the reference, plus 1 rad or m: the loop has left it
+
+
+class Simulator:
+    """The closed loop of one robot and one controller, ready for many runs.
+
+    constants : geometry and gravity that replace those of the robot file.   in_c : compile where there is a compiler.
+    """
+
+    def __init__(
+        self,
+        model: GeneratedModel,
+        controller: Controller,
+        *,
+        symbolic: SymbolicModel | None = None,
+        constants: Mapping[str, float] | None = None,
+        in_c: bool = True,
+    ) -> None:
+        if unknown := sorted(set(constants or {}) - set(model.CONSTANTS)):
+            raise InputError(f"{model.NAME} has no constant {', '.join(unknown)}; there are {', '.join(model.CONSTANTS)}")
+        self.model, self.controller, self.constants = model, controller, dict(constants or {})
+        self.law: ControlLaw = control_law(controller, model)
+        self.symbolic = symbolic or _beside(model)
+        self.friction: DryFriction = dry_friction(self.symbolic)
+        self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
+        self._ticks: dict[int, Any] = {}
+        self._blocks: dict[int, Any] = {}
+        self._tangents: dict[int, Any] = {}
+        self._bias = _rest_functions(self.symbolic, self.constants)
+
+    def run(
+        self,
+        X: Array,
+        reference: Reference,
+        *,
+        g: Array | float = 1.0,
+        start: Array | None = None,
+        ideal: bool = False,
+        disturbance: Array | None = None,
+        feedforward: Array | None = None,
+        seed: int | None = None,
+        name: str = "simulation",
+    ) -> Simulation:
+        """The arm with base parameters X (b,) along the reference.
+
+        g : factor on everything between position error and torque, (n,).   start : joint positions at t = 0, at rest.
+        ideal : no noise, no steps of encoder and converter.   disturbance : torques on the arm that are not recorded, (N, n).
+        feedforward : torques added to the command, (N, n), in place of those of the settings.   seed : of the noise; default: that of the settings.
+        """
+        seed = self.controller.seed if seed is None else seed
+        plan = self._plan(X, reference, g, start, disturbance, feedforward, None if ideal else seed)
+        states, out = self._iterated(plan)
+        return self._result(plan, states, out, reference, name)
+
+    def sensitivity(
+        self,
+        X: Array,
+        reference: Reference,
+        *,
+        g: Array | float = 1.0,
+        start: Array | None = None,
+        disturbance: Array | None = None,
+        feedforward: Array | None = None,
+    ) -> tuple[Simulation, Sensitivity]:
+        """An ideal run and its derivatives by X, from the tangent system stepped beside it (`simulation_tangent`)."""
+        plan = self._plan(X, reference, g, start, disturbance, feedforward, None)
+        states, out = self._iterated(plan)
+        found = self._result(plan, states, out, reference, "simulation")
+        if plan.substeps not in self._tangents:
+            tick = tangent_function(self.symbolic, self.friction, self.constants, plan.substeps, self.controller.integrator)
+            self._tangents[plan.substeps] = (compiled(tick) if self._in_c else tick).mapaccum(TANGENT_BLOCK)
+        before = np.vstack([plan.x, states[:-1]])
+        tangent = tangent_along(self._tangents[plan.substeps], before, plan, self.law.flags, TANGENT_BLOCK, self.controller.record_every)
+        return found, tangent
+
+    def _plan(
+        self,
+        X: Array,
+        reference: Reference,
+        g: Array | float,
+        start: Array | None,
+        disturbance: Array | None,
+        feedforward: Array | None,
+        seed: int | None,
+    ) -> Plan:
+        """seed : None for an ideal run."""
+        n, N = len(self.model.JOINTS), len(reference)
+        X, g = self._parameters(X), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
+        _check_shapes(reference, self.controller.rate, n, N, disturbance, feedforward)
+        substeps = self.substeps(X, reference, g)
+        noise, pushed, torque_noise = (np.zeros((N, n)),) * 3 if seed is None else self._noise(np.random.default_rng(seed), N)
+        pushed = pushed if disturbance is None else pushed + np.asarray(disturbance)
+        known = self._feedforward(reference) if feedforward is None else np.asarray(feedforward)
+        signals = np.hstack([reference.q, reference.qd, known + self.law.ca * reference.qdd, noise, pushed])
+        settling = round(self.controller.settle * self.controller.rate) if self.law.K.any() else 0
+        still = np.concatenate([reference.q[0], np.zeros(n), known[0], np.zeros(2 * n)])
+        return Plan(
+            x=self._start(reference, start, ideal=seed is None),
+            signals=np.vstack([np.tile(still, (settling, 1)), signals]),
+            settling=settling,
+            X=X,
+            g=g,
+            law=self.law.matrix(g, ideal=seed is None),
+            substeps=substeps,
+            torque_noise=torque_noise,
+        )
+
+    def _result(self, plan: Plan, states: Array, out: Array, reference: Reference, name: str) -> Simulation:
+        n, every = len(self.model.JOINTS), self.controller.record_every
+        _check_motion(states[plan.settling :, :n], reference)
+        before = np.vstack([plan.x, states[:-1]])[plan.settling :]
+        y, tau, qdd = np.split(out[plan.settling :], 3, axis=1)
+        qd = before[::every, n : 2 * n]
+        return Simulation(
+            t=reference.t[::every],
+            q=before[::every, :n],
+            qd=np.where(np.abs(qd) <= REST, 0.0, qd),
+            qdd=qdd[::every],
+            tau=tau[::every],
+            q_measured=y[::every],
+            tau_measured=(tau + plan.torque_noise)[::every],
+            q_r=reference.q[::every],
+            rate=self.controller.rate / every,
+            saturated=(np.abs(tau) >= plan.g * self.law.saturation * (1 - 1e-9)).mean(axis=0),
+            substeps=plan.substeps,
+            state=states[-1],
+            name=name,
+        )
+
+    def substeps(self, X: Array, reference: Reference, g: Array) -> int:
+        """Steps per tick. SimulationError where the inertia is not positive definite or the sampled loop is unstable on the reference."""
+        fastest = 0.0
+        for k in np.unique(np.linspace(0, len(reference) - 1, POINTS).astype(int)):
+            A, B = (np.atleast_2d(x.full()) for x in self._bias(reference.q[k], X * self.friction.smooth))
+            smallest, time = np.linalg.eigvalsh((A + A.T) / 2)[0], k / reference.rate
+            if not smallest > 0:
+                raise SimulationError(
+                    f"the inertia matrix of these parameters is not positive definite at {time:g} s of the reference, smallest eigenvalue {smallest:.3g}; "
+                    "take parameters of a physical robot (feasible, CAD), or a smaller step towards these",
+                    time=time,
+                )
+            pole = np.abs(discrete_poles(self.law, A, B, g)).max()
+            if pole > UNSTABLE:
+                raise SimulationError(
+                    f"the loop of these gains and parameters is unstable at {time:g} s of the reference: discrete pole of modulus {pole:.4g}, at most 1; "
+                    f"lower kp and {'kd' if self.controller.law.kind == 'pid' else 'kv'}, raise the controller's rate, or scale the gains with the inertia (g)",
+                    time=time,
+                )
+            fastest = max(fastest, continuous_pole(self.law, A, B, g))
+        steps = max(1, ceil(fastest / self.controller.rate / self.controller.pole_step))
+        if steps > MOST_SUBSTEPS:
+            raise SettingsError(
+                f"{steps} integration steps per tick, for a pole at {fastest:.3g} 1/s; at most {MOST_SUBSTEPS}: raise the rate or pole_step, or lower the gains",
+                path=("controller", "rate"),
+            )
+        return steps
+
+    def tick(self, substeps: int) -> Any:
+        """The CasADi function of one tick (`simulation_loop.tick_function`)."""
+        if substeps not in self._ticks:
+            tick = tick_function(self.symbolic, self.friction, self.constants, substeps, self.controller.integrator)
+            self._ticks[substeps] = compiled(tick) if self._in_c else tick
+        return self._ticks[substeps]
+
+    def _iterated(self, plan: Plan) -> tuple[Array, Array]:
+        """BLOCK ticks at a time: states after each tick (S + N, 6n), outputs y, tau, qdd (S + N, 3n)."""
+        if plan.substeps not in self._blocks:
+            self._blocks[plan.substeps] = self.tick(plan.substeps).mapaccum(BLOCK)
+        x, states, out = plan.x, [], []
+        for rows, used in blocks(plan.signals, BLOCK):
+            found = self._blocks[plan.substeps](x, rows.T, plan.X, plan.law, self.law.flags)
+            states.append(found[0].full().T[:used])
+            out.append(found[1].full().T[:used])
+            x = states[-1][-1]
+        return np.vstack(states), np.vstack(out)
+
+    def _start(self, reference: Reference, start: Array | None, *, ideal: bool) -> Array:
+        """State of the loop, (6n,), at rest."""
+        n = len(self.model.JOINTS)
+        given = self.controller.start if start is None else start
+        q = np.asarray(reference.q[0] if given is None else given, dtype=float)
+        if q.shape != (n,) or not np.isfinite(q).all():
+            raise InputError(f"start {q}; expected {n} finite joint positions")
+        y = q if ideal else self.law.seen(q)
+        return np.concatenate([q, np.zeros(n), y, y, np.zeros(2 * n)])
+
+    def _feedforward(self, reference: Reference) -> Array:
+        """Torque of the reference with the parameters of the robot file, (N, n), where the settings ask for it."""
+        if self.controller.feedforward == "none":
+            return np.zeros_like(reference.q)
+        X = parameters_of(self.model, self.controller)
+        return np.asarray(self.model.inverse_dynamics(reference.q, reference.qd, reference.qdd, X, **self.constants))  # type: ignore[attr-defined]
+
+    def _noise(self, rng: np.random.Generator, N: int) -> tuple[Array, Array, Array]:
+        """Encoder noise, torque on the arm, noise of the recorded torque: (N, n) each."""
+        n, torque, rate = len(self.model.JOINTS), self.controller.torque, self.controller.rate
+        encoder, pushed, recorded = rng.standard_normal((3, N, n))
+        size = np.broadcast_to(np.asarray(torque.disturbance, dtype=float), (n,))
+        if size.any():
+            if torque.bandwidth >= rate / 2:
+                raise SettingsError(
+                    f"{torque.bandwidth} Hz; expected less than half the controller's rate", path=("controller", "torque", "bandwidth")
+                )
+            pushed = lfilter(*butter(2, torque.bandwidth, fs=rate), pushed, axis=0)
+            pushed = pushed / pushed.std(axis=0)
+        return self.law.encoder_noise * encoder, size * pushed, np.asarray(torque.noise, dtype=float) * recorded
+
+    def _parameters(self, X: Array) -> Array:
+        X = np.asarray(X, dtype=float)
+        b = len(self.model.BASE_PARAMETERS)
+        if X.shape != (b,) or not np.isfinite(X).all():
+            raise InputError(f"X of shape {X.shape}; expected {b} finite base parameters of {self.model.NAME}")
+        return X
+
+
+def simulate(model: GeneratedModel, X: Array, controller: Controller, reference: Reference, **settings: Any) -> Simulation:
+    """One run; `settings` as for `Simulator.run`. Many runs of one loop: make a Simulator."""
+    return Simulator(model, controller).run(X, reference, **settings)
+
+
+def parameters_of(model: GeneratedModel, controller: Controller) -> Array:
+    """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in their place; 0 for those without effect."""
+    values = {**dict.fromkeys(model.NO_EFFECT, 0.0), **model.VALUES, **controller.values}  # type: ignore[attr-defined]
+    if missing := [name for name in model.STANDARD_PARAMETERS if name not in values]:  # type: ignore[attr-defined]
+        raise SettingsError(
+            f"{model.NAME} has no value of {', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the robot file or here, 0 where one is zero",
+            path=("controller", "values"),
+        )
+    if unknown := sorted(set(controller.values) - set(values.keys() & set(model.STANDARD_PARAMETERS))):  # type: ignore[attr-defined]
+        raise SettingsError(f"no standard parameter {', '.join(unknown)}", path=("controller", "values"))
+    return np.asarray(model.base_parameters(values), dtype=float)  # type: ignore[attr-defined]
+
+
+def inertia_ratio(model: GeneratedModel, X: Array, X_reference: Array, reference: Reference) -> Array:
+    """g_j = J_j(X)/J_j(X_reference), J_j the mean of A_jj over the reference: gains times g keep the bandwidth of the loop. Shape (n,)."""
+    inertia_matrix = model.inertia_matrix  # type: ignore[attr-defined]
+    J, J_reference = (np.einsum("tjj->j", inertia_matrix(reference.q, x)) for x in (X, X_reference))
+    return np.asarray(J / J_reference)
+
+
+def _beside(model: GeneratedModel) -> SymbolicModel:
+    """The CasADi module in the folder of the NumPy module."""
+    file = getattr(model, "__file__", None)
+    if file is None:
+        raise InputError(f"{model.NAME} has no file to look beside for its CasADi module; pass it as `symbolic`")
+    return load_symbolic(Path(file).with_name(f"{model.NAME}_casadi.py"), of=model)
+
+
+def _rest_functions(model: SymbolicModel, constants: Mapping[str, float]) -> Any:
+    """(q, Xs) -> A and the viscous friction B = dGamma/dqd at rest."""
+    n = len(model.JOINTS)
+    q, qd, X = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("X", len(model.BASE_PARAMETERS))
+    A = model.inertia_matrix(q=q, X=X, **constants)["A"]
+    B = ca.substitute(ca.jacobian(model.bias(q=q, qd=qd, X=X, **constants)["GAM"], qd), qd, ca.DM.zeros(n))
+    return ca.Function("at_rest", [q, X], [ca.densify(A), ca.densify(B)])
+
+
+def _check_shapes(reference: Reference, rate: float, n: int, N: int, *given: Array | None) -> None:
+    if reference.q.shape[1] != n:
+        raise InputError(f"reference of {reference.q.shape[1]} joints; expected {n}")
+    if abs(reference.rate / rate - 1) > 1e-9:
+        raise InputError(f"reference at {reference.rate:g} Hz; the controller runs at {rate:g} Hz")
+    for x in given:
+        if x is not None and np.shape(x) != (N, n):
+            raise InputError(f"torques of shape {np.shape(x)}; expected {(N, n)}, one row per tick of the reference")
+
+
+def _check_motion(q: Array, reference: Reference) -> None:
+    """SimulationError at the first tick where the motion is not finite or far from all reference."""
+    far = np.abs(reference.q).max() + FAR * (1 + np.ptp(reference.q, axis=0))
+    lost = ~(np.abs(q) < far)
+    if lost.any():
+        k, j = np.argwhere(lost)[0]
+        raise SimulationError(
+            f"the motion leaves its reference at {(k + 1) / reference.rate:g} s, position {j + 1} first: the loop is unstable there; lower the gains, "
+            "raise the rate, or slow the reference down",
+            time=(k + 1) / reference.rate,
+        )

@@ -1,0 +1,96 @@
+"""Which rows of Y = W X + rho are used: a window before evaluation, then decimated rows by their place and speed.
+
+The choice is made once, on the measured record, and shared by every run of a study, so that a row is never kept or dropped because of noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.observation.filters import decimation_factor, kept_samples
+from runtime.records.record import Record
+from runtime.settings.study import Rows, Signals
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Which samples are evaluated and which decimated rows are kept; shared by every run of a study.
+
+    samples : the window, in raw samples.   kept : shape (K,), kept instants, from the start of the window.   mask : bool (n, K), rows used.
+    """
+
+    samples: slice
+    kept: Array
+    mask: Array
+    factor: int
+    t: Array
+    rate: float
+    signals: Signals
+    rows: Rows
+    dropped: Mapping[str, tuple[int, ...]]
+
+
+def select_rows(record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None) -> Selection:
+    """Window, decimated instants, and the rows left out by trim, low speed and `keep`; qd, shape (N, n), are the filtered velocities."""
+    samples = _window(record, rows)
+    factor = decimation_factor(signals, record.rate)
+    N = samples.stop - samples.start
+    kept = kept_samples(N, factor, signals.decimate.phase if signals.decimate else "first")
+    instants = kept + samples.start
+    if len(kept) <= 2 * rows.trim:
+        raise InputError(
+            f"{len(kept)} rows per joint after decimation by {factor}, of which rows.trim leaves out {2 * rows.trim}; "
+            "use a longer record or window, or a smaller rows.trim",
+            file=record.name,
+        )
+    mask = np.ones((record.n, len(kept)), dtype=bool)
+    dropped = {}
+    for reason, usable in (
+        ("trim", _untrimmed(len(kept), rows.trim)),
+        ("low_speed", np.abs(qd[instants].T) >= per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None]),
+        ("mask", True if keep is None else _keep(keep, record)[instants].T),
+    ):
+        before = mask.sum(axis=1)
+        mask &= usable
+        dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
+    if not mask.any():
+        raise InputError(f"no row is left: {dropped} rows per joint were left out of {len(kept)}", file=record.name)
+    return Selection(samples, kept, mask, factor, record.t[instants], record.rate / factor, signals, rows, dropped)
+
+
+def _window(record: Record, rows: Rows) -> slice:
+    """Raw samples with t0 <= t <= t1."""
+    t0, t1 = rows.window
+    start = 0 if t0 is None else int(np.searchsorted(record.t, t0, side="left"))
+    stop = len(record) if t1 is None else int(np.searchsorted(record.t, t1, side="right"))
+    if stop <= start:
+        raise InputError(
+            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{record.t[0]:g}, {record.t[-1]:g}] s", file=record.name
+        )
+    return slice(start, stop)
+
+
+def _untrimmed(K: int, trim: int) -> Array:
+    inside = np.arange(K)
+    return (inside >= trim) & (inside < K - trim)
+
+
+def _keep(keep: Array, record: Record) -> Array:
+    keep = keep[:, None] if keep.ndim == 1 else keep
+    if keep.dtype != np.bool_ or keep.shape not in {(len(record), 1), (len(record), record.n)}:
+        raise InputError(f"keep {keep.dtype} {keep.shape}; expected bool {(len(record),)} or {(len(record), record.n)}", file=record.name)
+    return keep
+
+
+def per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
+    """A setting that is one number or one per joint, shape (n,)."""
+    values = np.atleast_1d(np.asarray(value, dtype=float))
+    if values.shape not in {(1,), (n,)}:
+        raise InputError(f"{name} has {len(values)} values; expected one or {n}, one per joint")
+    return np.broadcast_to(values, (n,))

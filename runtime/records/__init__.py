@@ -1,0 +1,1 @@
+"""From measured files to a `Record`: joint side, SI, uniform time."""

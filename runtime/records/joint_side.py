@@ -1,0 +1,173 @@
+"""From the columns of a file to positions and torques of the joint side, SI: names, finite numbers, scale, units, then the drives.
+
+Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.model.drives import Drives
+from runtime.records.formats.joint_states import JointTable
+from runtime.records.formats.table import Named, Table
+from runtime.settings.record import Columns, RecordSettings
+from runtime.settings.units import COMMANDS, position_unit, torque_unit
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """Factors of the n columns of positions (to rad or m) and of commands, and the drives behind which each was measured; None: joint side."""
+
+    positions: Array
+    commands: Array
+    of_positions: Drives | None
+    of_torques: Drives | None
+
+    def position(self, q: Array) -> Array:
+        """Joint positions, rad or m; q, shape (N, n), as in the file."""
+        q = q * self.positions
+        return q if self.of_positions is None else self.of_positions.joint_position(q)
+
+    def torque(self, tau: Array) -> Array:
+        """Joint torques, N m or N; tau, shape (N, n), as in the file."""
+        tau = tau * self.commands
+        return tau if self.of_torques is None else self.of_torques.joint_torque(tau)
+
+
+def conversion(settings: RecordSettings, drives: Drives | None, first: Table, last: Table, n: int) -> Conversion:
+    """How the columns of a record become joint side, SI; first, last : tables of the positions and of the torques."""
+    positions = _scale(settings.scale.q, first, n, "scale.q") * _position_units(settings, n)
+    scale, constant = _scale(settings.scale.tau, last, n, "scale.tau"), _torque_constant(settings, drives, n)
+    if "motor" not in settings.sides:
+        return Conversion(positions, scale * constant, None, None)
+    if drives is None:
+        raise InputError(
+            "side is motor but the robot has no drives; give them in the robot file, or a record of the joint side", file=first.file
+        )
+    used = replace(drives, torque_constant=constant, coupling=settings.coupling)
+    of_positions, of_torques = (used if side == "motor" else None for side in settings.sides)
+    return Conversion(positions, scale * constant if of_torques is None else scale, of_positions, of_torques)
+
+
+def column_names(settings: RecordSettings, first: Named, last: Named) -> Columns:
+    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag: the joints of its messages."""
+    given = settings.columns
+    t = given.t if given.t is not None or settings.rate is not None or "t" not in first.names else "t"
+    qr = given.qr or (_numbered("qr", first) if "qr1" in first.names else ())
+    if isinstance(first, JointTable) and settings.units.t != "s":
+        raise InputError(f"record.units.t is {settings.units.t}; time stamps of bags are read in s", file=first.file)
+    of_q = _meant(first, "q", "position", given.q)
+    of_tau = _meant(last, "tau", "effort", given.tau or (given.q if isinstance(last, JointTable) else ()))
+    if not {*of_q} <= {*first.names} and {*of_q} <= {*last.names} and {*of_tau} <= {*first.names}:
+        raise InputError(f"{first.file} holds the torques and {last.file} the positions; `files` are the positions, then the torques")
+    return Columns(t, of_q, of_tau, qr)
+
+
+def _meant(table: Named, key: str, quantity: str, names: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(table, JointTable):
+        return table.columns(quantity, names)
+    return tuple(names) or _numbered(key, table)
+
+
+def require_alike(names: Columns, first: Named, last: Named, q: tuple[int, ...], tau: tuple[int, ...]) -> None:
+    """Raise InputError where positions and torques, of these shapes, are not of one record."""
+    if first is not last and not set(names.q) & set(names.tau) and {*names.tau} <= {*first.names} and {*names.q} <= {*last.names}:
+        raise InputError(
+            f"{first.file} and {last.file} hold positions and torques each; two `files` are the positions and the torques of one record, "
+            f"further records are named by `also: [{last.file}]`"
+        )
+    if q[1:] != tau[1:]:
+        raise InputError(
+            f"{q[1]} columns of positions ({', '.join(names.q)}), {tau[1]} of torques ({', '.join(names.tau)}); expected one of each per joint",
+            file=first.file,
+        )
+    if q != tau:
+        raise InputError(f"{q[0]} samples of positions in {first.file}, {tau[0]} of torques in {last.file}; cut them to the same instants")
+
+
+def reference_columns(table: Table, names: Sequence[str], n: int) -> Array | None:
+    """Reference positions as the file holds them, where it does."""
+    if not names:
+        return None
+    q_r = finite_columns(table, names)
+    if q_r.shape[1] != n:
+        raise InputError(f"{q_r.shape[1]} reference positions {', '.join(names)}; expected {n}", file=table.file)
+    return q_r
+
+
+def _numbered(quantity: str, table: Named) -> tuple[str, ...]:
+    found = sorted((int(m[1]), name) for name in table.names if (m := re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name)))
+    if not found:
+        raise InputError(
+            f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name them in a study file, record.columns.{quantity}",
+            file=table.file,
+        )
+    return tuple(name for _, name in found)
+
+
+def finite_columns(table: Table, names: Sequence[str]) -> Array:
+    """The columns, shape (N, k), without nan or infinity."""
+    x = table.stack(names)
+    bad = np.argwhere(~np.isfinite(x))
+    if len(bad):
+        i, j = bad[0]
+        column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
+        raise InputError(
+            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut the record",
+            file=table.file,
+            column=column,
+            row=table.row(i),
+        )
+    return x
+
+
+def _per_joint(value: float | Sequence[float], n: int, key: str, table: Table | None = None) -> Array:
+    x = np.atleast_1d(np.asarray(value, dtype=float))
+    if len(x) not in (1, n):
+        raise InputError(
+            f"record.{key} has {len(x)} values; expected one or {n}, one per joint", file=None if table is None else table.file
+        )
+    return np.broadcast_to(x, (n,))
+
+
+def _scale(scale: float | tuple[float, ...] | str, table: Table, n: int, key: str) -> Array:
+    return _per_joint(table.scalar(scale) if isinstance(scale, str) else scale, n, key, table)
+
+
+def _units(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
+    each = units if isinstance(units, tuple) else (units,) * n
+    if len(each) != n:
+        raise InputError(f"record.{key} has {len(each)} units; expected one or {n}, one per joint")
+    return each
+
+
+def _position_units(settings: RecordSettings, n: int) -> Array:
+    """Factors to rad or m, shape (n,)."""
+    units = [position_unit(unit) for unit in _units(settings.units.q, n, "units.q")]
+    counts = _per_joint(1.0 if settings.counts_per_revolution is None else settings.counts_per_revolution, n, "counts_per_revolution")
+    return np.array([factor / (counts[j] if kind == "counts" else 1.0) for j, (kind, factor) in enumerate(units)])
+
+
+def _torque_constant(settings: RecordSettings, drives: Drives | None, n: int) -> Array:
+    """Factors from the unit of tau to N m or N, shape (n,): that of the unit, times a torque constant for current and voltage."""
+    names = _units(settings.units.tau, n, "units.tau")
+    units = [torque_unit(name) for name in names]
+    if not any(kind in COMMANDS for kind, _ in units):
+        return np.array([factor for _, factor in units])
+    if settings.torque_constant is not None:
+        constant = _per_joint(settings.torque_constant, n, "torque_constant")
+    elif drives is not None and settings.sides[1] == "motor":
+        constant = drives.torque_constant
+    else:
+        raise InputError(
+            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for currents of the motors set record.torque_side: motor, "
+            "then gears and torque constants are those of the robot's drives; else set record.torque_constant (N*m/A) with the gears in it"
+        )
+    return np.array([constant[j] * factor if kind in COMMANDS else factor for j, (kind, factor) in enumerate(units)])

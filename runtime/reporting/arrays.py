@@ -1,0 +1,138 @@
+"""Results for other programs: an Estimate and a resolution study as named arrays, in NPZ, MAT and CSV.
+
+    arrays = estimate_arrays(fit)                   # names as text arrays, X, sigma ..., joints, figures of the fit
+    np.load(BytesIO(npz(arrays)))                   # without pickles
+    load estimate.mat                               # MATLAB, Octave: names as cell arrays, value.ZZ1R beside X
+
+Same result, same bytes: neither file holds the time at which it was written.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from io import BytesIO, StringIO
+from typing import Any
+
+import numpy as np
+import scipy.io
+
+from runtime.estimators.estimate import Estimate, json_text
+from runtime.resolution.result import Cestac
+
+Array = np.ndarray
+
+LONGEST_NAME = 63  # characters of a name in MATLAB
+KEYWORDS = frozenset({"break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if", "otherwise",
+                      "parfor", "persistent", "return", "spmd", "switch", "try", "while"})  # fmt: skip
+HEADER = b"MATLAB 5.0 MAT-file, written by symgen"
+
+
+def estimate_arrays(fit: Estimate) -> dict[str, Array]:
+    """Names, numbers and texts of an Estimate; shapes (b,), (b, b) and per joint (n,)."""
+    joints = fit.per_joint
+    return {
+        "names": _texts(fit.names),
+        "units": _texts(fit.units.get(name, "") for name in fit.names),
+        "X": fit.X,
+        "sigma": fit.sigma,
+        "relative_sigma": fit.relative_sigma,
+        "sigma_corrected": fit.sigma_corrected,
+        "covariance": fit.covariance,
+        **{name: np.array(getattr(fit, name)) for name in ("sigma_rho", "cond", "cond_unit", "rank", "residual_norm", "relative_error")},
+        "joints": _texts(joint.joint for joint in joints),
+        "joint_rows": np.array([joint.rows for joint in joints], dtype=np.int64),
+        **{f"joint_{name}": np.array([getattr(j, name) for j in joints]) for name in ("residual_norm", "relative_error", "sigma_rho")},
+        **{name: np.array(text) for name, text in (("method", fit.method), ("status", fit.status), ("message", fit.message))},
+        **{name: np.array(json_text(part)) for name, part in (("settings", fit.settings), ("provenance", fit.provenance))},
+    }
+
+
+def cestac_arrays(result: Cestac) -> dict[str, Array]:
+    """Names, levels and figures of a resolution study; shapes (b,), (levels,) and (levels, b)."""
+    reference, levels, b = result.reference, result.levels, len(result.names)
+    by_parameter = ("mean", "sigma", "relative_sigma", "e", "half_width", "half_width_percent")
+    by_level = ("e_rho", "e_rho_own", "increase", "increase_own", "runs_needed")
+    return {
+        "names": _texts(result.names),
+        "units": _texts(reference.units.get(name, "") for name in result.names),
+        "deciding": np.array([name in result.deciding for name in result.names], dtype=bool),
+        "X_LS": reference.X,
+        "relative_sigma_LS": reference.relative_sigma,
+        "labels": _texts(r.level.label for r in levels),
+        "delta": np.array([r.level.delta for r in levels]),
+        "torque": np.array([r.level.torque for r in levels]),
+        **{name: np.array([getattr(r, name) for r in levels]).reshape(len(levels), b) for name in by_parameter},
+        **{name: np.array([getattr(r, name) for r in levels]) for name in by_level},
+        "verdicts": _texts(r.verdict for r in levels),
+        **{name: np.array(json_text(part)) for name, part in (("settings", result.settings), ("provenance", result.provenance))},
+    }
+
+
+def array_files(stem: str, arrays: Mapping[str, Array]) -> dict[str, str | bytes]:
+    """The arrays as stem.npz and stem.mat."""
+    return {f"{stem}.npz": npz(arrays), f"{stem}.mat": mat(arrays)}
+
+
+def npz(arrays: Mapping[str, Array]) -> bytes:
+    """A NumPy archive that loads without pickles."""
+    for name, array in arrays.items():
+        if array.dtype.hasobject:
+            raise TypeError(f"{name} holds Python objects; an archive holds numbers and texts")
+    content: dict[str, Any] = dict(arrays)
+    stream = BytesIO()
+    np.savez_compressed(stream, **content)
+    return stream.getvalue()
+
+
+def mat(arrays: Mapping[str, Array]) -> bytes:
+    """A MATLAB file (version 5): vectors as columns, texts as cell arrays, and `value`, a structure of X (or X_LS) by name."""
+    values = arrays.get("X", arrays.get("X_LS", np.empty(0)))
+    fields = dict(zip(matlab_names(map(str, arrays["names"])), values.tolist(), strict=True))
+    stream = BytesIO()
+    content = {name: _cells(array) for name, array in arrays.items()} | {"value": fields}
+    scipy.io.savemat(stream, content, oned_as="column", long_field_names=True, do_compression=True)
+    data = stream.getvalue()
+    return HEADER.ljust(116) + data[116:]
+
+
+def matlab_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Each name as MATLAB allows it: a letter, then letters, digits and _, at most 63, no keyword, none twice."""
+    found: list[str] = []
+    for name in names:
+        own = re.sub(r"[^A-Za-z0-9_]", "_", name)
+        own = own if re.match("[A-Za-z]", own) and own not in KEYWORDS else f"x{own}"
+        k, free = 1, own[:LONGEST_NAME]
+        while free in found:
+            k += 1
+            free = f"{own[: LONGEST_NAME - len(str(k)) - 1]}_{k}"
+        found.append(free)
+    return tuple(found)
+
+
+def cestac_csv(result: Cestac) -> str:
+    """cestac.csv: one line per level and parameter, then one for the residual ("rho": e is %e(rho), its increase beside it)."""
+    stream = StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(
+        ("level", "delta", "torque", "name", "unit", "X_LS", "mean", "sigma", "relative_sigma", "e", "half_width", "decides", "increase")
+    )
+    for r in result.levels:
+        place = (r.level.label, repr(float(r.level.delta)), repr(float(r.level.torque)))
+        for i, name in enumerate(result.names):
+            numbers = (repr(float(x[i])) for x in (result.reference.X, r.mean, r.sigma, r.relative_sigma, r.e, r.half_width))
+            writer.writerow((*place, name, result.reference.units.get(name, ""), *numbers, int(name in result.deciding), ""))
+        writer.writerow((*place, "rho", "", "", "", "", "", repr(float(r.e_rho)), "", 1, repr(float(r.increase))))
+    return stream.getvalue()
+
+
+def _texts(texts: Iterable[str]) -> Array:
+    return np.array(list(texts), dtype=np.str_)
+
+
+def _cells(array: Array) -> Array | str | Sequence[str]:
+    """Texts as MATLAB has them: one as characters, several as a cell array."""
+    if array.dtype.kind != "U":
+        return array
+    return str(array) if not array.ndim else np.array(array.tolist(), dtype=object)

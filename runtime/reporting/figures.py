@@ -1,0 +1,192 @@
+"""Figures of a report. matplotlib only here, through its object interface: no global state, no window, same data same bytes.
+
+Colours are those of Okabe and Ito, distinct with any colour vision; line styles and widths differ too, so that a grey print can be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from runtime.identification.validation import Comparison, JointComparison
+from runtime.reporting.series import gaps
+from runtime.resolution.result import BIASED, NEGLIGIBLE, Cestac
+
+BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = "#000000", "#0072B2", "#D55E00", "#007A5A", "#AA4499", "#56B4E9", "#9A9A9A"
+MARKED = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"), (SKY, "v"), ("#8C6D00", "P"))
+STYLE: Any = {
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.5,
+    "legend.frameon": False,
+    "svg.hashsalt": "symgen",
+    "svg.fonttype": "path",
+    "path.simplify": True,
+}
+DPI = 150
+
+
+def svg(figure: Figure) -> bytes:
+    """The figure as SVG, letters as outlines."""
+    return _rendered(figure, "svg")
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as PNG, 150 dots per inch."""
+    return _rendered(figure, "png")
+
+
+def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "measured") -> Figure:
+    """Measured and predicted torque of one joint, and their difference below (chapter, Fig. 4). source : "measured" or "simulated"."""
+    with mpl.rc_context(STYLE):
+        figure = empty_figure((5.4, 3.4))
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        t, measured, predicted, error = _broken(joint)
+        upper.plot(t, measured, color=BLACK, linewidth=1.5, label=source)
+        upper.plot(t, predicted, color=ORANGE, linewidth=1.0, linestyle=(0, (4, 1)), label="predicted")
+        lower.plot(t, error, color=BLUE, linewidth=0.7, label="error")
+        upper.set_ylabel(f"torque, {unit}")
+        lower.set_ylabel(f"error, {unit}")
+        lower.set_xlabel("time, s")
+        upper.set_title(_title(joint), fontsize=9, loc="right")
+        upper.legend(
+            ncols=2, loc="lower left", bbox_to_anchor=(-0.02, 1.0), fontsize=8, handlelength=2.0, columnspacing=1.0, borderaxespad=0.2
+        )
+    return figure
+
+
+def torque_overlay(comparison: Comparison, unit: str = "N m", source: str = "measured") -> Figure:
+    """Fig. 4 of the chapter: every joint in a panel of its own."""
+    joints = comparison.joints
+    columns = 1 if len(joints) == 1 else 2
+    rows = -(-len(joints) // columns)
+    with mpl.rc_context(STYLE):
+        figure, axes = panels_figure(rows, columns, (4.8 * columns, 2.3 * rows + 0.4))
+        for ax, joint in zip(axes, joints, strict=False):
+            _overlay(ax, joint, unit, source)
+        for ax in axes[len(joints) :]:
+            ax.set_visible(False)
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, ncols=3, loc="outside upper center")
+    return figure
+
+
+def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
+    """Residuals of every joint, each beside the normal law of the same deviation."""
+    joints = comparison.joints
+    columns = min(3, len(joints))
+    rows = -(-len(joints) // columns)
+    with mpl.rc_context(STYLE):
+        figure, axes = panels_figure(rows, columns, (max(5.4, 3.2 * columns), 2.1 * rows + 0.4))
+        for ax, joint in zip(axes, joints, strict=False):
+            deviation = float(np.std(joint.error)) or 1.0
+            x = np.linspace(-4, 4, 161)
+            ax.hist(
+                joint.error / deviation, bins=np.linspace(-4, 4, 41).tolist(), density=True, color=SKY, edgecolor="white", linewidth=0.3
+            )
+            ax.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color=BLACK, linewidth=1.2)
+            ax.set_title(f"joint {joint.joint}, deviation {deviation:.3g} {unit}", fontsize=9)
+            ax.set_xlabel("residual / deviation")
+            ax.set_yticks([])
+        for ax in axes[len(joints) :]:
+            ax.set_visible(False)
+    return figure
+
+
+def error_against_resolution(result: Cestac, names: Sequence[str] = (), unit: str = "rad") -> Figure:
+    """%e (21) against Delta on logarithmic axes, with the limits of the verdict and the increase of the residual.
+
+    names : parameters drawn in colour; default: the six of smallest %sigma (11). The other deciding ones are grey.
+    """
+    levels = [level for level in result.levels if level.level.delta and not level.level.torque]
+    levels.sort(key=lambda level: level.level.delta)
+    delta = np.array([level.level.delta for level in levels])
+    e = np.array([level.e for level in levels]).reshape(len(levels), -1)
+    chosen = [name for name in names if name in result.names] or _sharpest(result)
+    with mpl.rc_context(STYLE):
+        figure, (ax,) = panels_figure(1, 1, (6.4, 4.4))
+        for name in result.deciding:
+            if name not in chosen:
+                ax.plot(delta, _drawn(e[:, result.names.index(name)]), color="#C8C8C8", linewidth=0.8, zorder=1)
+        for (color, marker), name in zip(MARKED, chosen, strict=False):
+            ax.plot(delta, _drawn(e[:, result.names.index(name)]), color=color, marker=marker, markersize=5, linewidth=1.4, label=name)
+        ax.plot(
+            delta,
+            _drawn(np.array([abs(level.increase) for level in levels])),
+            color=BLACK,
+            linestyle="--",
+            linewidth=1.8,
+            label="residual, of |Y|",
+        )
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        ax.set_ylim(0.01, 1000)
+        for limit in (NEGLIGIBLE, BIASED):
+            ax.axhline(limit, color=BLACK, linewidth=0.9, linestyle=(0, (1, 2)))
+            ax.annotate(
+                f"{limit:g} %", (1.0, limit), xycoords=("axes fraction", "data"), xytext=(3, 0), textcoords="offset points", va="center"
+            )
+        ax.set_xticks(delta, [level.level.label.replace("2*pi/", "2π/") for level in levels], rotation=30, ha="right", fontsize=8)
+        ax.set_xticks([], minor=True)
+        ax.set_xlabel(f"resolution Δ, {unit}")
+        ax.set_ylabel("%e: change of the estimate, %")
+        figure.legend(ncols=4, loc="outside upper center", fontsize=8)
+    return figure
+
+
+def _overlay(ax: Axes, joint: JointComparison, unit: str, source: str) -> None:
+    """Lines break where rows were left out or another record starts."""
+    t, measured, predicted, error = _broken(joint)
+    ax.plot(t, measured, color=BLACK, linewidth=1.5, label=source)
+    ax.plot(t, predicted, color=ORANGE, linewidth=1.0, linestyle=(0, (4, 1)), label="predicted")
+    ax.plot(t, error, color=BLUE, linewidth=0.7, label="error")
+    ax.set_title(_title(joint), fontsize=9)
+    ax.set_xlabel("time, s")
+    ax.set_ylabel(f"torque, {unit}")
+
+
+def _title(joint: JointComparison) -> str:
+    return f"joint {joint.joint}, error {joint.relative_error:.1f} %"
+
+
+def _broken(joint: JointComparison) -> tuple[np.ndarray, ...]:
+    holes = gaps(joint.t)
+    return tuple(np.insert(np.asarray(x, dtype=float), holes, np.nan) for x in (joint.t, joint.measured, joint.predicted, joint.error))
+
+
+def _sharpest(result: Cestac) -> list[str]:
+    order = np.argsort(result.reference.relative_sigma, kind="stable")
+    return [result.names[i] for i in order[: len(MARKED)]]
+
+
+def _drawn(values: np.ndarray) -> np.ndarray:
+    """Values of a logarithmic axis: zeros and what is not finite are not drawn."""
+    return np.where(np.isfinite(values) & (values > 0), values, np.nan)
+
+
+def panels_figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    figure = empty_figure(size)
+    return figure, list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
+
+
+def empty_figure(size: tuple[float, float]) -> Figure:
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _rendered(figure: Figure, form: str) -> bytes:
+    stream = BytesIO()
+    with mpl.rc_context(STYLE):
+        figure.savefig(stream, format=form, dpi=DPI, metadata={"Date": None} if form == "svg" else {"Software": None})
+    return stream.getvalue()

@@ -1,0 +1,171 @@
+"""A report as one HTML file that opens anywhere: images, style and script inside, no request to anyone. jinja2 only here.
+
+A Page is plain values; the template holds the layout. Everything that comes from a file or a user is escaped, by the template or by `markup.element`;
+numbers for the script are JSON in which <, > and & are escapes. The content security policy allows this script and this style sheet by their
+hashes, hence nothing else. Without scripts, and in print, figures are the images and tables stand as they were written.
+"""
+
+from __future__ import annotations
+
+import json
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from hashlib import sha256
+from importlib.resources import files
+from typing import Any, Literal
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+
+from runtime.markup import Markup, element
+from runtime.reporting.series import Series
+
+State = Literal["good", "doubtful", "no", "open", ""]
+SCRIPTS = ("chart.js", "page.js")
+SIGNS = {"good": "✓", "doubtful": "!", "no": "✕", "open": "–"}
+WORDS = {"good": "good", "doubtful": "doubtful", "no": "no", "open": "not judged"}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells are text or Markup; the first of a row names it and stands to the left, the others to the right. `note` follows the table.
+
+    wide : numbers of columns (from 0) of words, to the left.   sortable : by any column, where scripts run.
+    kinds : one word per row; a button `only` then leaves the rows of the first kind.   stacked : on a narrow screen every row is a block of lines.
+    """
+
+    caption: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    wide: Sequence[int] = ()
+    sortable: bool = False
+    kinds: Sequence[str] = ()
+    only: str = ""
+    stacked: bool = False
+
+    def __post_init__(self) -> None:
+        wrong = [row for row in self.rows if len(row) != len(self.header)]
+        if wrong:
+            raise ValueError(
+                f"table {self.caption!r}: {len(wrong[0])} cells in {tuple(wrong[0])}; expected {len(self.header)}, {self.header}"
+            )
+        if self.kinds and len(self.kinds) != len(self.rows):
+            raise ValueError(f"table {self.caption!r}: {len(self.kinds)} kinds; expected {len(self.rows)}, one per row")
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """A square table of numbers between -1 and 1, shaded by their size; `names` of rows and columns."""
+
+    caption: str
+    names: Sequence[str]
+    values: Sequence[Sequence[float]]
+
+    @property
+    def cells(self) -> list[list[tuple[str, int]]]:
+        """(text, shade from 0 to 4) by row; what rounds to nothing is 0."""
+        return [[(f"{x:+.2f}".replace("-", "−") if abs(x) >= 0.005 else "0", min(4, int(5 * abs(x)))) for x in row] for row in self.values]
+
+
+@dataclass(frozen=True)
+class Image:
+    """A figure as SVG; `alt` says what it shows to those who do not see it. series : what a script draws in its place."""
+
+    caption: str
+    svg: bytes
+    alt: str
+    series: Series | None = None
+
+    @property
+    def data(self) -> str:
+        """Base64 of the SVG, for a data: address."""
+        return b64encode(self.svg).decode("ascii")
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading, paragraphs, then figures, tables and a listing that opens on demand."""
+
+    title: str
+    text: Sequence[str] = ()
+    images: Sequence[Image] = ()
+    tables: Sequence[Table] = ()
+    listing: str = ""
+    matrices: Sequence[Matrix] = ()
+
+
+@dataclass(frozen=True)
+class Number:
+    """One of the figures that stand under the verdict."""
+
+    label: str
+    value: str
+    state: State = ""
+
+
+@dataclass(frozen=True)
+class Page:
+    """verdict : one sentence.   state : of the verdict, with the `answer` to the `question` in a word or two.   remarks : (what, sentence) after it.
+
+    warning : what must not be overlooked, such as simulated data.
+    """
+
+    title: str
+    verdict: str
+    sections: Sequence[Section]
+    warning: str = ""
+    footer: str = ""
+    state: State = ""
+    question: str = "Verdict"
+    answer: str = ""
+    remarks: Sequence[tuple[str, str]] = ()
+    numbers: Sequence[Number] = ()
+
+
+def told(state: State) -> Markup:
+    """A state as sign and word, coloured besides."""
+    return element("span", f"{SIGNS[state]} {WORDS[state]}" if state else "", class_=f"state {state}")
+
+
+def render(page: Page) -> str:
+    """The HTML text of a page. Same page, same bytes."""
+    images = [image for section in page.sections for image in section.images if image.series is not None]
+    scripted = bool(images) or any(table.sortable or table.kinds for section in page.sections for table in section.tables)
+    style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS)) if scripted else ""
+    allowed = f"script-src '{_hash(script)}'; " if scripted else ""
+    return _template().render(
+        page=page,
+        told=told,
+        signs=SIGNS,
+        style=Markup(style),
+        script=Markup(script),
+        data=embedded([image.series.data for image in images if image.series is not None]),
+        number_of={id(image): k for k, image in enumerate(images)},
+        id=id,
+        policy=f"default-src 'none'; img-src data:; style-src '{_hash(style)}'; {allowed}base-uri 'none'; form-action 'none'",
+    )
+
+
+def embedded(value: Any) -> Markup:
+    """JSON that neither ends a script element nor opens a comment in one."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
+    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+
+
+def _hash(text: str) -> str:
+    return "sha256-" + b64encode(sha256(text.encode("utf-8")).digest()).decode("ascii")
+
+
+@lru_cache(maxsize=4)
+def _resource(name: str) -> str:
+    return files("runtime.reporting").joinpath(name).read_text(encoding="utf-8")
+
+
+@lru_cache(maxsize=1)
+def _template() -> Template:
+    environment = Environment(
+        loader=PackageLoader("runtime.reporting", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template("report.html.jinja")

@@ -1,0 +1,49 @@
+"""What a feasible estimate says beyond its parameters: eigenvalues, standard parameters, and whether least squares alone was feasible."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+from runtime.estimators.estimate import Estimate, aligned
+from runtime.markup import number
+from runtime.reporting.page import Section, Table
+
+
+def physical_section(fit: Estimate) -> Section:
+    """Conditions with their smallest eigenvalues, then the standard parameters."""
+    details = fit.details
+    conditions = Table(
+        "Conditions of a physical robot",
+        ("condition", "smallest eigenvalue", "at its limit"),
+        [
+            (name, number(value, ".3e"), "yes" if name in details["active"] else "")
+            for name, value in details["smallest_eigenvalues"].items()
+        ],
+    )
+    standard = Table(
+        "Standard parameters of one such robot", ("parameter", "value"), [(n, number(v, ".5g")) for n, v in details["standard"].items()]
+    )
+    text = (
+        fit.message,
+        "Pseudo-inertias of the links and forms of the actuators must be positive semidefinite, inertia and friction not negative; all base parameters "
+        "are fitted together. The standard parameters give exactly the torques of the base parameters; what the torques leave open is nearest to "
+        "the values of the robot file.",
+    )
+    return Section("Physical consistency", text, tables=[conditions, standard])
+
+
+def eigenvalue_table(fit: Estimate) -> str:
+    """The conditions as plain text."""
+    active = fit.details["active"]
+    rows = [(name, f"{value:.4e}", "at its limit" if name in active else "") for name, value in fit.details["smallest_eigenvalues"].items()]
+    return aligned([("condition", "smallest eigenvalue", ""), *rows])
+
+
+def standard_csv(fit: Estimate) -> str:
+    """standard_parameters.csv: name, value."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(("name", "value"))
+    writer.writerows((name, repr(value)) for name, value in fit.details["standard"].items())
+    return stream.getvalue()

@@ -1,0 +1,96 @@
+"""Figure and section of the resolution advisor: predicted curves beside sampled points, parameter by parameter."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, panels_figure, svg
+from runtime.reporting.page import Image, Section, Table
+from runtime.resolution.advice import Advice, EncoderAdvice, counts
+
+COLUMNS = 5
+LOWEST, HIGHEST = 0.03, 300.0  # %, of the axes
+
+
+def advice_figure(advice: Advice) -> Figure:
+    """%e against Delta for every parameter that matters, all encoders alike: line predicted, points sampled with their Student intervals."""
+    names = advice.deciding
+    columns = min(COLUMNS, max(1, len(names)))
+    rows = -(-len(names) // columns)
+    first = advice.encoders[0]
+    with mpl.rc_context(STYLE):
+        figure, axes = panels_figure(rows, columns, (max(4.6, 2.1 * columns), 1.5 * rows + 1.0))
+        for ax, name in zip(axes, names, strict=False):
+            _panel(ax, first, advice.names.index(name), name)
+        for ax in axes[len(names) :]:
+            ax.set_visible(False)
+        for k, ax in enumerate(axes[: len(names)]):
+            ax.tick_params(labelleft=k % columns == 0, labelbottom=k + columns >= len(names), labelsize=7)
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, ncols=3, loc="outside upper center", fontsize=8)
+        figure.supxlabel(f"resolution Δ of every encoder, {advice.unit}", fontsize=9)
+        figure.supylabel("%e: change of the estimate, %", fontsize=9)
+    return figure
+
+
+def _panel(ax: Axes, found: EncoderAdvice, i: int, name: str) -> None:
+    e = np.abs(found.change[:, i])
+    ax.plot(found.delta, np.where(e > 0, e, np.nan), color=BLUE, linewidth=1.3, label="predicted")
+    delta = np.array([point.delta for point in found.sampled])
+    change = np.array([abs(point.change[i]) for point in found.sampled])
+    half = np.array([point.half_width[i] for point in found.sampled])
+    below = np.minimum(half, change - LOWEST / 10).clip(min=0)  # an interval that holds zero ends below the axis
+    ax.errorbar(
+        delta, change, yerr=np.array([below, half]), color=ORANGE, fmt="o", markersize=3.5, linewidth=1.0, capsize=2, label="sampled, 95 %"
+    )
+    for limit in found.limits:
+        ax.axhline(limit.percent, color=BLACK, linewidth=0.8, linestyle=(0, (1, 2)))
+        if np.isfinite(limit.delta):
+            ax.axvline(limit.delta, color=GREY, linewidth=0.8)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_ylim(LOWEST, HIGHEST)
+    ax.set_title(name, fontsize=9)
+
+
+def advice_section(advice: Advice) -> Section:
+    """Steps by encoder and by parameter, the figure, the assumptions."""
+    header = (
+        "encoder",
+        *(
+            h
+            for limit in advice.encoders[0].limits
+            for h in (f"{limit.percent:g} %: Delta, {advice.unit}", "", "first parameter", "sampled %e")
+        ),
+    )
+    rows = []
+    for encoder in advice.encoders:
+        cells = [encoder.label]
+        for limit in encoder.limits:
+            sampled = "-" if limit.sampled is None else f"{limit.error:.2f} ± {limit.half_width:.2f}"
+            cells += [f"{limit.delta:.3g}", counts(limit.delta) if advice.unit == "rad" else "", limit.parameter or "-", sampled]
+        rows.append(tuple(cells))
+    lines = advice.parameter_lines()
+    tables = [
+        Table(
+            "Coarsest step of each encoder, the others exact; sampled: %e of that parameter with the Student interval of the runs",
+            header,
+            rows,
+        ),
+        Table(
+            "All encoders alike, by parameter; * does not decide; last column: %sigma added by white motor torque noise of deviation 1",
+            lines[0],
+            lines[1:],
+        ),
+    ]
+    image = Image(
+        "%e against resolution: predicted curve and sampled points of every parameter that matters; dotted: 1 % and 5 %; grey: the steps advised",
+        svg(advice_figure(advice)),
+        "Change of every parameter in per cent against encoder resolution, predicted and sampled, logarithmic axes",
+    )
+    return Section(
+        "Resolution advice", (advice.verdict, *advice.asked_lines(), *advice.assumptions), [image] if advice.deciding else [], tables
+    )

@@ -1,0 +1,1 @@
+"""Encoder resolution: CESTAC (chapter, section 3) and the advisor."""

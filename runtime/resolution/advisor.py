@@ -1,0 +1,272 @@
+"""Resolution advisor: the coarsest encoder that keeps the change of the estimate below 1 % and below 5 %, predicted without sampling.
+
+CESTAC rounds every position at random, many times, and asks how far the mean estimate moves. That mean is known to first order in the variance v
+of the rounding (errors in variables), from the expected normal equations of `runtime.observation.position_errors`:
+
+    X(v) = E[W_c' W_c]^-1 E[W_c' Y]                %e (21) = 100 |1 - X(v) / X(0)|
+
+    v = Delta^2 (two-point, gaussian), Delta^2 / 3 (uniform, quantise)
+
+so that one set of sensitivities gives the curve of every parameter, for all encoders together and for one at a time with the others exact. The step at
+which the first parameter that matters reaches a limit is confirmed by runs of CESTAC, with Student intervals. Parameters matter when their
+%sigma (11) is at most 10, as in CESTAC's verdict; small parameters with a large %sigma do not decide.
+
+Noise of the torques does not move the mean: Y is linear in it. What it adds to sigma is, for white noise of the motors
+
+    C = A^-1 (sum_ij Omega_ij W_i'W_j) A^-1,  A = W'W,  Omega = c R'R,  c = G(0)^2 / n_d of the decimation (the noise that slow columns see)
+
+Weights of the joints (method wls) are those of the unperturbed fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError, SettingsError
+from runtime.estimators import linear_system
+from runtime.estimators.essential import essential
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.linear import assemble
+from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import observe, stack
+from runtime.observation.position_errors import Normal, Perturbation, perturbation
+from runtime.records.record import Record
+from runtime.resolution.advice import Advice, EncoderAdvice, Limit, crossing
+from runtime.resolution.result import BIASED, DECIDING, NEGLIGIBLE, deciding_names
+from runtime.resolution.sampler import ALL, Sampler
+from runtime.settings.study import Study, to_mapping
+
+Array = np.ndarray
+Progress = Callable[[int, int], None]
+
+LIMITS = (NEGLIGIBLE, BIASED)
+"""%e at which a step is sought."""
+VARIANCE = {"two-point": 1.0, "gaussian": 1.0, "uniform": 1 / 3, "quantise": 1 / 3}
+"""Variance of a rounding over Delta^2, `runtime.resolution.rounding`."""
+RATIO = 1.3
+"""Ratio of neighbouring steps of a curve."""
+WALK = 40
+"""Steps tried below and above the first guess."""
+BELOW, ABOVE = 3, 9
+"""Steps of the curve of all encoders below the first limit and above the last: factors of 2 and 10."""
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """X as a function of the step, for the encoders of several records of one robot.
+
+    parts : the records.   weights : ndarray, shape (n,), 1/s_j.   share : variance of the rounding over Delta^2.
+    """
+
+    parts: tuple[Perturbation, ...]
+    weights: Array
+    share: float
+
+    def change(self, delta: float, encoders: Sequence[int]) -> Array:
+        """100 (X(v)/X(0) - 1), shape (b,), in %."""
+        X = self._solved(self.share * delta**2, encoders)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(100 * (X / self._solved(0.0, ()) - 1))
+
+    def rate(self, encoders: Sequence[int]) -> Array:
+        """Change in % per Delta^2 at Delta = 0, shape (b,), columns that switch left out."""
+        clean = self._total(0.0, ())
+        X = clean.solve(self.weights)
+        added = _sum([part.smooth[i] for part in self.parts for i in encoders])
+        moved = Normal(clean.G, added.g - added.G @ X).solve(self.weights)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(100 * self.share * moved / X)
+
+    def _solved(self, variance: float, encoders: Sequence[int]) -> Array:
+        return self._total(variance, encoders).solve(self.weights)
+
+    def _total(self, variance: float, encoders: Sequence[int]) -> Normal:
+        return _sum([part.expected(variance, encoders) for part in self.parts])
+
+
+def advise(
+    model: GeneratedModel,
+    records: Record | Sequence[Record],
+    study: Study,
+    *,
+    columns: Sequence[str] | None = None,
+    asked: Sequence[float] = (),
+    encoders: Sequence[str] | None = None,
+    drives: Drives | None = None,
+    constants: Mapping[str, float] | None = None,
+    confirm: bool = True,
+    progress: Progress | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Advice:
+    """Advice by the settings of `study`: side, rounding, columns and runs are those of study.cestac.
+
+    columns : essential names where they are known; default: by study.cestac.columns.   asked : steps whose %e is predicted besides.
+    encoders : "all" and numbers of joints whose encoder alone is coarse; default: "all", then every one.
+    confirm : sample at the steps found, study.cestac.runs times each.   progress : called with the number of choices of encoders done and their total.
+    Raises SettingsError for a method that is not linear least squares and for a median filter, which no prediction goes through.
+    """
+    records = (records,) if isinstance(records, Record) else tuple(records)
+    _refuse(study)
+    names = _columns(model, records, study, columns, constants)
+    parts = tuple(perturbation(model, record, study, names, drives=drives, constants=constants) for record in records)
+    settings = replace(study.estimate, columns="all")
+    seen = stack([part.seen for part in parts]) if len(parts) > 1 else parts[0].seen
+    system = linear_system(seen, settings)
+    reference = assemble(system, system.solve(), model=model, provenance=provenance)
+    predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[study.cestac.rounding])
+    decisive = [names.index(name) for name in deciding_names(reference)]
+    choices = _choices(model, encoders)
+    sampler = Sampler(model, records, parts, study.cestac, settings, dict(constants or {}), reference)
+    advices = []
+    for label, chosen in choices.items():
+        found = _advice(predictor, label, chosen, names, decisive)
+        advices.append(sampler.confirmed(found, chosen) if confirm else found)
+        if progress is not None:
+            progress(len(advices), len(choices))
+    return Advice(
+        names=names,
+        reference=reference,
+        encoders=tuple(advices),
+        asked=tuple(asked),
+        steps=np.array([predictor.change(delta, range(len(model.JOINTS))) for delta in asked]).reshape(len(asked), len(names)),
+        torque_sigma=torque_sigma(predictor, drives or _drives(model)),
+        assumptions=assumptions(study, records, parts, reference),
+        settings={
+            **seen.settings,
+            "estimate": to_mapping(study.estimate),
+            "cestac": to_mapping(study.cestac),
+            "rate": [record.rate for record in records],
+        },
+        provenance={**reference.provenance, "seed": study.cestac.seed},
+    )
+
+
+def _choices(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
+    """Coarse encoders (from 0) by label."""
+    n = len(model.JOINTS)
+    every = {ALL: tuple(range(n)), **{str(joint): (i,) for i, joint in enumerate(model.JOINTS)}}
+    labels = tuple(wanted) if wanted is not None else tuple(every)[: n + 1 if n > 1 else 1]
+    unknown = [label for label in labels if label not in every]
+    if unknown or not labels:
+        raise InputError(f"no encoder {', '.join(unknown) or 'named'}; expected some of {', '.join(every)}")
+    return {label: every[label] for label in labels}
+
+
+def _advice(predictor: Predictor, label: str, encoders: Sequence[int], names: Sequence[str], decisive: Sequence[int]) -> EncoderAdvice:
+    """Limits by a walk on steps in geometric progression; the curve of all encoders goes on beyond them."""
+    rate = np.abs(predictor.rate(encoders)[decisive]).max(initial=0.0)
+    if not (np.isfinite(rate) and rate > 0):
+        return EncoderAdvice(label, tuple(Limit(percent, np.inf, "") for percent in LIMITS), np.empty(0), np.empty((0, len(names))))
+    start = float(np.sqrt(LIMITS[0] / rate))
+    known: dict[int, Array] = {}
+
+    def worst(k: int) -> float:
+        if k not in known:
+            known[k] = predictor.change(start * RATIO**k, encoders)
+        return float(np.abs(known[k][decisive]).max())
+
+    low = next((k for k in range(0, -WALK, -1) if worst(k) < LIMITS[0]), -WALK)
+    high = next((k for k in range(low, WALK) if worst(k) > LIMITS[-1]), WALK - 1)
+    if label == ALL:
+        low, high = low - BELOW, high + ABOVE
+    for k in range(low, high + 1):
+        worst(k)
+    order = sorted(known)
+    delta, change = start * RATIO ** np.array(order, dtype=float), np.array([known[k] for k in order])
+    limits = []
+    for percent in LIMITS:
+        steps = [crossing(delta, np.abs(change[:, i]), percent) for i in decisive]
+        first = int(np.nanargmin(steps)) if np.isfinite(steps).any() else None
+        limits.append(Limit(percent, np.inf, "") if first is None else Limit(percent, steps[first], names[decisive[first]]))
+    return EncoderAdvice(label, tuple(limits), delta, change)
+
+
+def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
+    """Deviation of X, shape (b,), per unit deviation of white noise of every motor torque."""
+    n = predictor.parts[0].seen.n
+    R = np.eye(n) if drives is None else drives.ratio
+    w = predictor.weights
+    middle, A = 0.0, 0.0
+    for part in predictor.parts:
+        b = len(part.seen.names)
+        full = np.zeros((n, len(part.selection.kept), b))
+        full[part.selection.mask] = part.seen.W
+        Omega = R.T @ R * part.band.gain**2 / part.selection.factor
+        middle = middle + np.einsum("i,j,ij,iKa,jKb->ab", w**2, w**2, Omega, full, full, optimize=True)
+        A = A + np.einsum("j,jab->ab", w**2, part.clean.G)
+    inverse = np.linalg.inv(A)
+    return np.asarray(np.sqrt(np.diag(inverse @ middle @ inverse)))
+
+
+def assumptions(study: Study, records: Sequence[Record], parts: Sequence[Perturbation], reference: Estimate) -> tuple[str, ...]:
+    """What the prediction stands on, in words."""
+    cestac, low = study.cestac, study.signals.lowpass
+    law = {
+        "two-point": "+-Delta, variance Delta^2",
+        "gaussian": "normal, deviation Delta",
+        "uniform": "uniform within +-Delta, variance Delta^2/3",
+        "quantise": "to the grid of step Delta below or above, taken as white noise of variance Delta^2/3",
+    }[cestac.rounding]
+    rates = ", ".join(f"{record.rate:g} Hz" for record in records)
+    filters = (
+        "no low-pass"
+        if low is None
+        else f"Butterworth of order {low.order} at {low.cutoff:g} Hz forward and backward on {' and '.join(low.on)}"
+    )
+    out = [name for name in reference.names if name not in deciding_names(reference)]
+    friction = ", ".join(reference.names[s.column] for s in parts[0].switches)
+    return (
+        f"Encoders: rounding {cestac.rounding} ({law}) of every sample, independent from sample to sample, on the {cestac.side} side, sampled at {rates}.",
+        f"Filters: {filters}, no median, decimation by {', '.join(str(part.selection.factor) for part in parts)}. Another rate or cut-off gives another answer.",
+        f"Method {study.estimate.method}; first order in the variance of the errors, motion slow beside the filters; rows used and weights are those of the record.",
+        *(
+            [f"Friction that switches with the sign of a speed ({friction}) by its mean and covariance under normal errors."]
+            if friction
+            else []
+        ),
+        f"Parameters matter whose %sigma (11) is at most {DECIDING:g} %" + (f"; not: {', '.join(out)}." if out else ", here all of them."),
+        "Torques: white noise of the motors does not bias X, to first order and beyond, since Y is linear in it and W does not know it; it adds to sigma.",
+    )
+
+
+def _refuse(study: Study) -> None:
+    if study.estimate.method not in ("ols", "wls"):
+        raise SettingsError(
+            f"{study.estimate.method!r}; the prediction is that of least squares, use ols or wls", path=("estimate", "method")
+        )
+    if study.estimate.weights == "covariance":
+        raise SettingsError("'covariance'; the prediction knows weights by joint, use joint or iterated", path=("estimate", "weights"))
+
+
+def _columns(
+    model: GeneratedModel, records: Sequence[Record], study: Study, columns: Sequence[str] | None, constants: Mapping[str, float] | None
+) -> tuple[str, ...]:
+    """Names of the columns: a list, all, or the essential ones of the identification that `study` describes."""
+    wanted = study.cestac.columns
+    if wanted == "all":
+        return tuple(model.BASE_PARAMETERS)
+    if wanted != "essential":
+        return wanted
+    if columns is not None:
+        return tuple(columns)
+    observations = [observe(model, record, study, constants=constants) for record in records]
+    return essential(stack(observations), study.essential, study.estimate).names
+
+
+def _drives(model: GeneratedModel) -> Drives | None:
+    return None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
+
+
+def _sum(parts: Sequence[Normal]) -> Normal:
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total
+
+
+__all__ = ["Predictor", "Sampler", "advise", "assumptions", "torque_sigma"]

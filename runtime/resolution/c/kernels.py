@@ -1,0 +1,266 @@
+"""The fused C kernels of studies (kernels.c), compiled on first use: filters, decimation and least squares around the signals of a robot in C.
+
+    FilteredStates(q, rate, signals, room)                  as runtime.observation.filters.filtered_states
+    Entries(model, names)                                   which signals stand where in the wanted columns
+    decimated(entries, states, samples, ...)                kept samples of the wanted signals; the signals are not stored
+
+Least squares on these rows, and on states that are streamed: `runtime.resolution.c.least_squares`.
+
+The same matrices and the same order of operations as the NumPy path where that costs nothing: filtered states agree with scipy's in every bit on
+x86-64, the rest to rounding. Nothing is allocated in C; `Room` holds what calls reuse, one for each thread.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.signal import sosfilt_zi
+
+from runtime.errors import InputError
+from runtime.model.compile_cache import FLAGS, NotCompiledError, cache_folder, shared_object
+from runtime.model.compiled import CompiledModel
+from runtime.observation.decimation import Plan
+from runtime.observation.filters import butterworth, decimation_plan, median_filtered, require_longer
+from runtime.settings.study import Decimate, Lowpass
+from runtime.settings.study import Signals as SignalSettings
+
+Array = np.ndarray
+
+SOURCE = Path(__file__).with_name("kernels.c")
+FUSED_FLAGS = tuple({"-O2": "-O3", "-ffp-contract=off": "-ffp-contract=fast"}.get(flag, flag) for flag in FLAGS)
+ABI = 1
+LANES, SIDE, SPAN, STATE = 8, 4, 512, 8  # of kernels.c; LANES is 1 without vector types
+TOGETHER = 640  # most samples of signals evaluated together, except where one block is longer: these stay in cache
+REFUSALS = {1: "arguments that do not fit each other", 2: "a block that the signals of the robot refuse"}
+
+
+def _fields(numbers: str = "", pointers: str = "") -> list[tuple[str, Any]]:
+    """Fields of a structure: int64 numbers, then pointers."""
+    return [(name, ctypes.c_int64) for name in numbers.split()] + [(name, ctypes.c_void_p) for name in pointers.split()]
+
+
+class LowpassStructure(ctypes.Structure):
+    """struct lowpass."""
+
+    _fields_ = _fields("sections pad", "sos zi")
+
+
+class StatesStructure(ctypes.Structure):
+    """struct states."""
+
+    _fields_ = [
+        *_fields("N n sample joint pad ends"),
+        ("rate", ctypes.c_double),
+        ("step", ctypes.c_double),
+        ("on_q", LowpassStructure),
+        ("on_qd", LowpassStructure),
+        *_fields(pointers="given up q qd"),
+    ]
+
+
+class SourceStructure(ctypes.Structure):
+    """struct source."""
+
+    _fields_ = [*_fields(pointers="signals constants"), *_fields("count S tile length", "wanted U rows")]
+
+
+class DecimationStructure(ctypes.Structure):
+    """struct decimation."""
+
+    _fields_ = _fields("begin N phase L G blocks most first final rest ystride", "start block back end d x y")
+
+
+class EntriesStructure(ctypes.Structure):
+    """struct entries."""
+
+    _fields_ = _fields("n most", "start signal sign A g O R taken")
+    most: int
+
+
+class RowsStructure(ctypes.Structure):
+    """struct rows."""
+
+    _fields_ = _fields("m tile count ystride mstride", "U Y mask")
+
+
+STRUCTURES = (StatesStructure, SourceStructure, DecimationStructure, EntriesStructure, RowsStructure)
+
+
+@lru_cache(maxsize=4)
+def library(folder: Path | None = None) -> ctypes.CDLL:
+    """kernels.c, from the cache or compiled; NotCompiledError or OSError where it cannot be had."""
+    return shared_object(SOURCE, SOURCE.read_bytes(), folder or cache_folder(), _opened, FUSED_FLAGS)
+
+
+def _opened(path: Path) -> ctypes.CDLL:
+    """The object, if it has this interface."""
+    found = ctypes.CDLL(str(path))
+    layout = (ctypes.c_int64 * 8)()
+    try:
+        found.fused_abi.restype = ctypes.c_int32
+        abi = found.fused_abi()
+        found.fused_layout.restype = None
+        found.fused_layout(layout)
+        for name in ("states", "gather", "decimated", "normal", "residual", "rows", "stream"):
+            getattr(found, f"fused_{name}").restype = ctypes.c_int32
+    except AttributeError as e:
+        raise NotCompiledError(f"{SOURCE.name} is not the one of this version: {e}") from e
+    expected = [SIDE, SPAN, *map(ctypes.sizeof, STRUCTURES)]
+    if abi != ABI or layout[0] not in (1, LANES) or list(layout[1:]) != expected:
+        raise NotCompiledError(f"{SOURCE.name} has interface {abi} and sizes {list(layout)}, expected {ABI} and {[LANES, *expected]}")
+    return found
+
+
+class Room:
+    """Arrays that calls reuse, by name: a fresh one costs more than what is computed in it. One Room for each thread."""
+
+    def __init__(self) -> None:
+        self._arrays: dict[str, Array] = {}
+
+    def array(self, name: str, *shape: int, dtype: Any = float) -> Array:
+        """An array of this shape, not initialised, on a 64-byte boundary: the one given under this name before, where it fits."""
+        found = self._arrays.get(name)
+        if found is None or found.shape != shape:
+            size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+            raw = np.empty(size + 64, dtype=np.uint8)
+            start = -raw.ctypes.data % 64
+            found = self._arrays[name] = raw[start : start + size].view(dtype).reshape(shape)
+        return found
+
+
+def address(x: Array) -> int:
+    """Where the numbers lie. Keep the array for as long as C may read it."""
+    return int(x.ctypes.data)
+
+
+def call(name: str, *arguments: Any) -> None:
+    """fused_NAME of the C file; InputError where it refuses."""
+    status = getattr(library(), f"fused_{name}")(*arguments)
+    if status:
+        raise InputError(f"fused_{name} in C refused {REFUSALS.get(status, f'its arguments with {status}')}")
+
+
+@lru_cache(maxsize=8)
+def _lowpass(low: Lowpass | None, name: str, rate: float) -> tuple[LowpassStructure, Array, Array]:
+    """Filter of one signal, and the arrays it points to; no sections where the signal is not filtered."""
+    if low is None or name not in low.on:
+        return LowpassStructure(0, 0, None, None), np.empty(0), np.empty(0)
+    sos, pad = butterworth(rate, low)
+    sos, zi = np.ascontiguousarray(sos), np.ascontiguousarray(sosfilt_zi(sos))
+    return LowpassStructure(len(sos), pad, address(sos), address(zi)), sos, zi
+
+
+class FilteredStates:
+    """q, qd, qdd of measured positions q, shape (N, n): median, low-pass, difference, low-pass, difference. As C keeps them, in `room`.
+
+    up, step : moves q before all filters but the median by +step where `up`, uint8 of shape (N, n), is 1, and by -step where it is 0.
+    """
+
+    def __init__(self, q: Array, rate: float, signals: SignalSettings, room: Room, *, up: Array | None = None, step: float = 0.0) -> None:
+        given = np.asarray(median_filtered(q, signals.median), dtype=float)
+        self.N, self.n = given.shape
+        (on_q, *_), (on_qd, *_) = (_lowpass(signals.lowpass, name, rate) for name in ("q", "qd"))
+        pad, ends = max(on_q.pad, on_qd.pad), 1 if signals.ends == "one-sided" else 2
+        require_longer(self.N, max(pad, ends))
+        groups = -(-self.n // LANES)
+        lanes = room.array("lanes", 2, groups, self.N + 2 * pad, LANES)
+        steps = [step // given.itemsize for step in given.strides]
+        pointers = address(given), None if up is None else address(up), address(lanes[0]), address(lanes[1])
+        self.lanes, self.structure = lanes, StatesStructure(self.N, self.n, *steps, pad, ends, rate, step, on_q, on_qd, *pointers)
+        call("states", ctypes.byref(self.structure))
+
+    def rows(self, samples: slice) -> Array:
+        """q, qd, qdd of these samples, shape (3, n, samples)."""
+        m = samples.stop - samples.start
+        found = np.empty((3, self.n, m))
+        pointers = [ctypes.c_void_p(address(x)) for x in found]
+        call("gather", ctypes.byref(self.structure), *map(ctypes.c_int64, (samples.start, m)), *pointers, ctypes.c_int64(m))
+        return found
+
+
+class Entries:
+    """Where the signals of a robot stand in the columns `names`: entry e of joint j is sign[e]*U[signal[e]], start[j] <= e < start[j + 1].
+
+    columns : by joint, positions in `names` of its entries.   wanted : signals that occur, `number` their position in it, by entry.
+    """
+
+    def __init__(self, model: CompiledModel, names: Sequence[str]) -> None:
+        unknown = [name for name in names if name not in model.BASE_PARAMETERS]
+        if unknown:
+            raise InputError(f"no column {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}")
+        table, n = model.signals, len(model.JOINTS)
+        place = np.array([{name: k for k, name in enumerate(names)}.get(name, -1) for name in model.BASE_PARAMETERS])[table.column]
+        order = np.lexsort((place, table.row))
+        order = order[place[order] >= 0]
+        self.model, self.names, self.n = model, tuple(names), n
+        self.start = np.concatenate([[0], np.cumsum(np.bincount(table.row[order], minlength=n))]).astype(np.int32)
+        self.columns = tuple(place[order][self.start[j] : self.start[j + 1]] for j in range(n))
+        self.place: Array = place[order]
+        self.signal: Array = table.signal[order].astype(np.int32)
+        self.sign = np.ascontiguousarray(table.sign[order], dtype=float)
+        self.wanted, number = np.unique(self.signal, return_inverse=True)
+        self.number: Array = number.reshape(-1).astype(np.int32)
+
+
+def constant_values(model: CompiledModel, constants: Mapping[str, float]) -> Array:
+    """Geometry and gravity in the order of CONSTANTS, some of them in place of the robot file's."""
+    unknown = set(constants) - set(model.CONSTANTS)
+    if unknown:
+        raise InputError(f"{model.NAME} has no constants {', '.join(sorted(unknown))}; there are {', '.join(model.CONSTANTS) or 'none'}")
+    return np.array([float({**model.CONSTANTS, **constants}[c]) for c in model.CONSTANTS] or [0.0])
+
+
+@lru_cache(maxsize=8)
+def _matrices(p: Plan) -> tuple[Array, Array, Array, Array]:
+    """start, block, back and end of kernels.c: products of the plan with those of the state below, outputs filled up to whole states."""
+    step = np.kron(np.diag(p.step.real), np.eye(2)) + np.kron(np.diag(p.step.imag), np.array([[0.0, 1.0], [-1.0, 0.0]]))
+    block, back, end = np.zeros((p.L + STATE, 3 * STATE)), np.zeros((STATE, 2 * STATE)), np.zeros((len(p.A) + STATE, 2 * STATE))
+    block[: p.L, : p.PQY.shape[1]] = p.PQY
+    block[p.L :, : 2 * STATE + p.G] = np.hstack([step, p.Mx, p.Yx])
+    back[:, : STATE + p.G] = np.hstack([step, p.Yv])
+    end[:, : p.A.shape[1]] = np.vstack([p.A, p.Ax])
+    return np.ascontiguousarray(p.X0), block, back, end
+
+
+def decimated(
+    entries: Entries, states: FilteredStates, samples: slice, factor: int, settings: Decimate | None, constants: Array, room: Room
+) -> Array:
+    """The kept samples of the wanted signals, shape (S, K): row i is signal entries.wanted[i].
+
+    samples : those used of the states.   constants : of `constant_values`.   The result is one of `room`.
+    """
+    p = decimation_plan(samples.stop - samples.start, factor, settings)
+    if p is None:
+        return _every_sample(entries, states, samples, constants, room)
+    table, S = entries.model.signals, len(entries.wanted)
+    most = _blocks_together(p.L, table.tile)
+    length = -(-max(len(p.X0), len(p.A), p.L * most) // table.tile) * table.tile
+    U, rows = room.array("U", table.count * length), room.array("rows", 3, states.n, table.tile)
+    y, d, x = room.array("y", S, p.K), room.array("d", p.blocks, S, 2 * STATE), room.array("x", S, STATE)
+    numbers = table.count, S, table.tile, length
+    source = SourceStructure(table.address, address(constants), *numbers, *map(address, (entries.wanted, U, rows)))
+    sizes = p.blocks, most, len(p.X0), len(p.A), p.K - p.blocks * p.G, p.K
+    plan = DecimationStructure(samples.start, p.N, p.phase, p.L, p.G, *sizes, *map(address, (*_matrices(p), d, x, y)))
+    call("decimated", *map(ctypes.byref, (states.structure, source, plan)))
+    return y
+
+
+def _blocks_together(L: int, tile: int) -> int:
+    """Blocks of L samples evaluated together: those that fill the tiles best, up to TOGETHER samples."""
+    return min(range(1, max(1, TOGETHER // L) + 1), key=lambda k: (-k * L % tile) / (k * L))
+
+
+def _every_sample(entries: Entries, states: FilteredStates, samples: slice, constants: Array, room: Room) -> Array:
+    """The wanted signals at all samples, shape (S, N)."""
+    N, table = samples.stop - samples.start, entries.model.signals
+    U, rows = room.array("U", table.count, N), states.rows(samples)
+    pointers = [ctypes.c_void_p(address(x)) for x in (*rows, constants, U)]
+    size = ctypes.c_int64(N)
+    if ctypes.CFUNCTYPE(ctypes.c_int32)(table.address)(size, *pointers[:3], size, *pointers[3:], size):
+        raise InputError(f"{entries.model.NAME}: its signals in C refused {N} samples")
+    return np.take(U, entries.wanted, axis=0, out=room.array("y", len(entries.wanted), N), mode="clip")

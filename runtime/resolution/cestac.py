@@ -1,0 +1,234 @@
+"""Encoder resolution by the CESTAC method (chapter, section 3): what would a coarser encoder have done to the estimate?
+
+    q_CESTAC  every raw sample of the position rounded at random, steps of Delta                     eqs. (15), (28), `runtime.resolution.rounding`
+    W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC), through the filters of the identification          eq. (16)
+    X_CESTAC = least squares of Y on W_CESTAC, Y as measured                                         eq. (17)
+
+N runs per Delta (`runtime.resolution.run`) give the mean (18), the deviation (19), %sigma (20), %e (21) and the residual (22); `runtime.resolution.result` holds and judges
+them. The rows used are those of the measured record in every run. Steps of the motor torque (`torque`, section 4.1.3) are studied alone and
+with the first Delta. Columns are by default the essential ones of the identification, rounding is two-point, on the joint side: those
+reproduce the chapter's figures.
+
+The bandwidth of the noise decides everything, so sampling rate, cut-off and median window stand in the settings of the result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from hashlib import sha256
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from runtime import distributed
+from runtime.errors import InputError, SettingsError
+from runtime.estimators import linear_system
+from runtime.estimators.essential import essential
+from runtime.estimators.linear import assemble
+from runtime.model.compile_cache import processor
+from runtime.model.compiled import CompiledModel, target_of
+from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel
+from runtime.model.text import ModelText
+from runtime.observation.filters import filtered_states
+from runtime.observation.observation import decimated_torque, observe, select_rows, stack
+from runtime.parallel import results
+from runtime.records.record import Record
+from runtime.resolution.c import cestac_run as fused_cestac
+from runtime.resolution.checkpoint import Checkpoint
+from runtime.resolution.device import Device
+from runtime.resolution.result import Cestac, Level, level_result
+from runtime.resolution.run import Part, Task, forget, observed, run_block
+from runtime.resolution.runs import Runs
+from runtime.settings.study import CestacSettings, Study, to_mapping
+
+Array = np.ndarray
+Progress = Callable[[int, int], None]
+Key = tuple[int, int]
+
+BLOCK = 20
+"""Most runs of one task: about a second, beside which sending it is nothing."""
+
+
+def cestac(
+    model: GeneratedModel,
+    records: Record | Sequence[Record],
+    study: Study,
+    *,
+    columns: Sequence[str] | None = None,
+    drives: Drives | None = None,
+    constants: Mapping[str, float] | None = None,
+    workers: int = 0,
+    scheduler: str | None = None,
+    device: Device | None = None,
+    progress: Progress | None = None,
+    checkpoint: Checkpoint | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Cestac:
+    """Resolution study by the settings study.cestac.
+
+    Parameters
+    ----------
+    records : one record of the robot, or several that are stacked.
+    columns : essential names where they are known; default: those of `study` on these records. Unused unless study.cestac.columns is "essential".
+    drives : motor side; default: DRIVES of the model.
+    constants : values in place of the robot file's.
+    workers : processes, 0 for this one (`runtime.parallel`); the results do not depend on it. A script that asks for processes needs the usual
+        `if __name__ == "__main__"`.
+    scheduler : address of a Dask cluster that works instead (`runtime.distributed`), with the same results.
+    device : arrays that work instead, in this process (`runtime.resolution.device`), with the same results to rounding.
+    progress : called with the number of runs done and their total.
+    checkpoint : where runs are kept while the study lasts; those of an interrupted or shorter study with the same settings are not repeated.
+    """
+    settings, model = study.cestac, fused_cestac.usable(model)
+    records = (records,) if isinstance(records, Record) else tuple(records)
+    drives = Drives.from_mapping(model.DRIVES) if drives is None and model.DRIVES is not None else drives
+    if settings.side == "motor" and drives is None:
+        raise SettingsError(
+            f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("cestac", "side")
+        )
+    if device is not None and (workers or scheduler):
+        raise InputError("a device works in this process; leave out workers and scheduler")
+    if scheduler and workers:
+        raise InputError("a scheduler has workers of its own; leave out workers")
+    names = _columns(model, records, study, columns, constants)
+    task = Task(
+        parts=tuple(_part(record, study) for record in records),
+        model=model,
+        names=names,
+        estimate=replace(study.estimate, columns="all"),
+        settings=settings,
+        levels=levels_of(settings),
+        drives=drives,
+        constants=dict(constants or {}),
+    )
+    seen = observed(task, model, Level(0.0), ())
+    system = linear_system(seen, task.estimate)
+    reference = assemble(system, system.solve(), model=model, provenance=provenance)
+    described = {
+        **seen.settings,
+        "estimate": to_mapping(study.estimate),
+        "cestac": to_mapping(settings),
+        "rate": [record.rate for record in records],
+        "target": device.name if device else target_of(model),
+        "torque_side": "joint" if drives is None else "motor",
+    }
+    finished = checkpoint.resume(_identity(task, described, reference.provenance), len(names)) if checkpoint else Runs.of((), len(names))
+    runs = _all_runs(task, finished, partial(_results, task, workers, scheduler, device), progress, checkpoint)
+    return Cestac(
+        names=names,
+        reference=reference,
+        levels=tuple(level_result(level, runs.where(runs.level == k), seen, reference) for k, level in enumerate(task.levels)),
+        settings=described,
+        provenance={**reference.provenance, "seed": settings.seed, "processor": processor()},
+    )
+
+
+def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
+    """Positions alone for every Delta; then torques alone, and torques with the first Delta, for every Phi."""
+    steps = settings.torque or ()
+    with_position = [Level(settings.delta[0], phi) for phi in steps] if settings.delta else []
+    return (*(Level(delta, 0.0) for delta in settings.delta), *(Level(0.0, phi) for phi in steps), *with_position)
+
+
+def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> list[tuple[Key, ...]]:
+    """Keys (level, run) in tasks of at most BLOCK runs with fixed borders: contiguous runs of one level or, where levels share their random
+    numbers, all levels of contiguous runs. A study of few runs has small tasks, so that there are some for every worker.
+    """
+    size = max(1, min(BLOCK, runs // 4) // (levels if common else 1))
+
+    def block(key: Key) -> Key:
+        return (0 if common else key[0], key[1] // size)
+
+    return [tuple(group) for _, group in groupby(sorted(keys, key=lambda key: (block(key), key[1], key[0])), key=block)]
+
+
+def _all_runs(
+    task: Task,
+    finished: Runs,
+    compute: Callable[[Sequence[tuple[Key, ...]]], Iterator[Runs]],
+    progress: Progress | None,
+    checkpoint: Checkpoint | None,
+) -> Runs:
+    """Every run, by level and number, in whatever order they finished."""
+    runs, b = task.settings.runs, len(task.names)
+    parts = [finished.where((finished.level < len(task.levels)) & (finished.run < runs))]
+    done, total = len(parts[0]), runs * len(task.levels)
+    known = parts[0].keys
+    missing = [key for level in range(len(task.levels)) for run in range(runs) if (key := (level, run)) not in known]
+    try:
+        for part in compute(key_blocks(missing, runs, len(task.levels), task.settings.common)):
+            parts.append(part)
+            done += len(part)
+            if checkpoint is not None:
+                checkpoint.add(part)
+            if progress is not None:
+                progress(done, total)
+    finally:  # also when Ctrl-C or an error ends the study
+        forget()
+        fused_cestac.forget()
+        if checkpoint is not None:
+            checkpoint.flush()
+    return Runs.joined(parts, b)
+
+
+def _results(task: Task, workers: int, scheduler: str | None, device: Device | None, blocks: Sequence[tuple[Key, ...]]) -> Iterator[Runs]:
+    """Blocks of runs, from this process, several, a cluster or a device."""
+    if device is not None:
+        return device(task, blocks)
+    in_c = isinstance(task.model, CompiledModel)
+    run = fused_cestac.run_block if in_c else run_block
+    if not blocks or not (workers or scheduler):
+        return results(run, task, blocks)
+    text = fused_cestac.CompiledText if in_c else ModelText
+    sent = replace(task, model=task.model if isinstance(task.model, ModelText) else text.of(task.model))
+    return distributed.results(run, sent, blocks, scheduler) if scheduler else results(run, sent, blocks, workers)
+
+
+def _identity(task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """What decides every bit of every run: JSON values that tell studies apart, the number of runs aside."""
+    drives = task.drives
+    return {
+        **{key: value for key, value in described.items() if key != "cestac"},
+        **{f"cestac.{key}": value for key, value in described["cestac"].items() if key != "runs"},
+        "columns": list(task.names),
+        "constants": dict(task.constants),
+        "drives": None
+        if drives is None
+        else [drives.ratio.tolist(), drives.offset.tolist(), drives.torque_constant.tolist(), drives.coupling],
+        "robot": provenance.get("robot"),
+        "robot_sha256": provenance.get("robot_sha256"),
+        "records": [
+            sha256(np.ascontiguousarray(part.q).tobytes() + np.ascontiguousarray(part.tau).tobytes()).hexdigest() for part in task.parts
+        ],
+        "versions": provenance["versions"],
+    }
+
+
+def _part(record: Record, study: Study) -> Part:
+    """Rows and torques of the measured record, through the filters of the study."""
+    signals = replace(study.signals, median=study.cestac.median)
+    selection = select_rows(record, filtered_states(record.q, record.rate, signals).qd, signals, study.rows)
+    return Part(record.q, record.tau, record.rate, dict(record.files), selection, decimated_torque(record.tau, selection))
+
+
+def _columns(
+    model: GeneratedModel, records: Sequence[Record], study: Study, columns: Sequence[str] | None, constants: Mapping[str, float] | None
+) -> tuple[str, ...]:
+    """Names of the columns: a list, all, or the essential ones of the identification that `study` describes."""
+    wanted = study.cestac.columns
+    if wanted == "essential":
+        if columns is None:
+            observations = [observe(model, record, study, constants=constants) for record in records]
+            return essential(stack(observations), study.essential, study.estimate).names
+        wanted = tuple(columns)
+    elif wanted == "all":
+        wanted = tuple(model.BASE_PARAMETERS)
+    unknown = [name for name in wanted if name not in model.BASE_PARAMETERS]
+    if unknown:
+        message = f"no parameter {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}"
+        raise SettingsError(message, path=("cestac", "columns"))
+    return wanted

@@ -1,0 +1,281 @@
+"""Results of a resolution study, and its verdict.
+
+With N runs X_k at one level and X_LS from the unperturbed record, by parameter:
+
+    mean      (18)  X = sum X_k / N                 sigma  (19)  = sqrt(sum (X_k - X)^2 / (N - 1))
+    %sigma    (20)  = 100 sigma / |X|               %e     (21)  = 100 |1 - X / X_LS|
+    interval        X +- t sigma / sqrt(N), t of Student's law with N - 1 degrees of freedom
+
+and for the residual, where rho_LS = Y - W X_LS, two readings of rho_CESTAC and two measures of each:
+
+    printed   rho_CESTAC = Y - W X, the measured W, as printed below (22)      own   Y - W_CESTAC X_k, mean of the norms over the runs
+    %e(rho)   (22)  = 100 |1 - ||rho_CESTAC|| / ||rho_LS|| |                   increase = 100 (||rho_CESTAC|| - ||rho_LS||) / ||Y||
+
+As printed, (22) grows to hundreds of per cent where Table 3 says about ten; the increase relative to ||Y|| has the printed order.
+
+Verdict of the chapter: all %e and %e(rho) below 1 %: practically unbiased; above 5 %: biased; between: doubtful. Parameters whose own %sigma (11)
+is large do not decide; the result says which ones did. Section 4.1.4 calls the residual the best single indicator, as it sees the whole model:
+`residual_verdict` applies the same two limits to its increase alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtrit
+
+from runtime.estimators.estimate import Estimate, aligned, json_text
+from runtime.latex import error_table, level_table
+from runtime.observation.observation import Observation
+from runtime.reporting.notebook import cestac_html
+from runtime.resolution.runs import Runs
+
+Array = np.ndarray
+
+SCHEMA = "symgen-cestac/1"
+"""Kind and version of the JSON layout, published as runtime/schemas/cestac.schema.json (`symgen schema --of cestac`)."""
+NEGLIGIBLE = 1.0
+"""%e below which the estimator is practically unbiased (chapter, section 3)."""
+BIASED = 5.0
+"""%e above which it is biased."""
+DECIDING = 10.0
+"""%sigma (11) of the reference above which a parameter does not decide: in Table 2, MX3, OFFSET4 and OFFSET6."""
+CONFIDENCE = 0.95
+"""Probability of the Student intervals."""
+LISTED = 1000
+"""Largest number of runs that the JSON text lists; beyond, they are in the archives of the checkpoint (`runtime.resolution.checkpoint`)."""
+MOST_RUNS = 100_000
+"""Largest number of runs that `runs_needed` answers."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """Steps of one column of the study: position (rad or m) and motor torque (N m or N); 0 means not perturbed."""
+
+    delta: float
+    torque: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """Such as `2*pi/10000`, or `Phi 0.01` for a torque."""
+        parts = []
+        if self.delta:
+            counts = 2 * np.pi / self.delta
+            parts.append(f"2*pi/{counts:.0f}" if counts >= 2 and abs(counts - round(counts)) < 1e-9 * counts else f"{self.delta:.4g}")
+        if self.torque:
+            parts.append(f"Phi {self.torque:.4g}")
+        return " + ".join(parts) or "none"
+
+
+@dataclass(frozen=True, eq=False)
+class LevelResult:
+    """One resolution. Arrays have shape (b,), in the order of the names.
+
+    mean, sigma, relative_sigma, e : eqs. (18)-(21).   half_width : of the Student interval of the mean, SI; `half_width_percent` of |X_LS|.
+    e_rho, e_rho_own, increase, increase_own : the residual, in %; see the head of this module.
+    verdict : "unbiased", "doubtful" or "biased"; residual_verdict : the same of `increase` alone.   decided_by : %e of what decided, by name ("rho" for the residual), largest first.
+    runs_needed : runs after which the intervals of the deciding parameters are narrower than 1 % of X_LS.
+    """
+
+    level: Level
+    runs: Runs
+    mean: Array
+    sigma: Array
+    relative_sigma: Array
+    e: Array
+    half_width: Array
+    half_width_percent: Array
+    e_rho: float
+    e_rho_own: float
+    increase: float
+    increase_own: float
+    verdict: str
+    residual_verdict: str
+    decided_by: Mapping[str, float]
+    runs_needed: int
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class Cestac:
+    """A resolution study: the reference X_LS, and one result per level.
+
+    settings : signals, rows, estimator, study and sampling rate, complete; the bandwidth of the noise is among them.
+    """
+
+    names: tuple[str, ...]
+    reference: Estimate
+    levels: tuple[LevelResult, ...]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return self.to_table()
+
+    @cached_property
+    def deciding(self) -> tuple[str, ...]:
+        """Parameters that decide the verdict: %sigma (11) of the reference at most DECIDING."""
+        return deciding_names(self.reference)
+
+    @property
+    def verdict(self) -> str:
+        """The worst verdict of the levels."""
+        return max((result.verdict for result in self.levels), key=("unbiased", "doubtful", "biased").index, default="unbiased")
+
+    @property
+    def lists_runs(self) -> bool:
+        """Whether the JSON text holds every run."""
+        return sum(len(level.runs) for level in self.levels) <= LISTED
+
+    def to_table(self) -> str:
+        """As the chapter's Table 3: parameters by levels, then the residual and the verdict."""
+        results = self.levels
+        lines: list[Sequence[str]] = [("parameter", "LS", *(r.level.label for r in results))]
+        for i, name in enumerate(self.names):
+            lines.append((name, f"{self.reference.X[i]:.4g}", *(f"{r.mean[i]:.4g}" for r in results)))
+        lines.append(("largest error %", "", *(f"{max(r.decided_by.values(), default=np.nan):.2f}" for r in results)))
+        lines.append(("%e(rho), printed", "", *(f"{r.e_rho:.2f}" for r in results)))
+        lines.append(("%e(rho), own W", "", *(f"{r.e_rho_own:.2f}" for r in results)))
+        lines.append(("increase / |Y| %", "", *(f"{r.increase:.2f}" for r in results)))
+        lines.append(("increase, own W %", "", *(f"{r.increase_own:.2f}" for r in results)))
+        lines.append(("verdict", "", *(r.verdict for r in results)))
+        lines.append(("verdict of increase", "", *(r.residual_verdict for r in results)))
+        notes = "\n".join(f"{r.level.label}: {r.message}" for r in results)
+        return f"{aligned(lines)}\n\n{notes}"
+
+    def errors_table(self) -> str:
+        """%e (21) and, in brackets, %sigma (20) of every parameter and level; `*` marks parameters that do not decide."""
+        lines: list[Sequence[str]] = [("parameter", *(r.level.label for r in self.levels))]
+        for i, name in enumerate(self.names):
+            mark = "" if name in self.deciding else " *"
+            lines.append((name + mark, *(f"{r.e[i]:.2f} ({r.relative_sigma[i]:.2f})" for r in self.levels)))
+        return aligned(lines)
+
+    def _repr_html_(self) -> str:
+        return cestac_html(self)
+
+    def _repr_latex_(self) -> str:
+        return self.to_latex()
+
+    def to_latex(self) -> str:
+        """LaTeX (booktabs): the mean values as the chapter's Tables 3 and 4, then %e as its Table 7, each a tabular."""
+        labels, names, units = [r.level.label for r in self.levels], self.names, self.reference.units
+        mean, e = (np.array([getattr(r, name) for r in self.levels]).reshape(len(labels), len(names)) for name in ("mean", "e"))
+        residual = (r"\%e($\rho$)", np.array([r.e_rho for r in self.levels]))
+        increase = (r"increase of $\|\rho\|$ over $\|Y\|$", np.array([r.increase for r in self.levels]))
+        both = (residual, increase)
+        return f"{level_table(names, units, labels, mean, both)}\n{error_table(names, labels, e, both)}"
+
+    def to_json(self) -> str:
+        """JSON text of everything; every run included, up to LISTED of them."""
+        return json_text(self.summary())
+
+    def summary(self) -> dict[str, Any]:
+        """What `to_json` writes, as a mapping."""
+        return {
+            "schema": SCHEMA,
+            "names": self.names,
+            "X_LS": self.reference.X,
+            "relative_sigma_LS": self.reference.relative_sigma,
+            "deciding": self.deciding,
+            "verdict": self.verdict,
+            "levels": [self._level_summary(level) for level in self.levels],
+            "settings": self.settings,
+            "provenance": self.provenance,
+        }
+
+    def _level_summary(self, level: LevelResult) -> dict[str, Any]:
+        """The fields of one level; of many runs, their number and the number solved by normal equations stand for them."""
+        runs = list(level.runs) if self.lists_runs else None
+        counts = {"run_count": len(level.runs), "by_normal_equations": int(level.runs.normal.sum())}
+        return {**{f.name: getattr(level, f.name) for f in fields(level)}, "runs": runs, **counts}
+
+
+def deciding_names(reference: Estimate) -> tuple[str, ...]:
+    """Names whose %sigma (11) is at most DECIDING."""
+    return tuple(name for name, relative in zip(reference.names, reference.relative_sigma, strict=True) if relative <= DECIDING)
+
+
+def level_result(level: Level, runs: Runs, measured: Observation, reference: Estimate) -> LevelResult:
+    """Eqs. (18)-(22) and the verdict of one level; `measured` is the unperturbed system with the columns of the runs."""
+    X, N = runs.X, len(runs)
+    mean, sigma = X.mean(axis=0), X.std(axis=0, ddof=1)
+    rho_ls, norm_Y = reference.residual_norm, float(np.linalg.norm(measured.Y))
+    rho = float(np.linalg.norm(measured.Y - measured.W @ mean))
+    own = float(runs.residual_norm.mean())
+    with np.errstate(divide="ignore", invalid="ignore"):
+        e = 100 * np.abs(1 - mean / reference.X)
+        spread = 100 * sigma / np.abs(reference.X)
+        relative_sigma = 100 * sigma / np.abs(mean)
+    half = float(stdtrit(N - 1, (1 + CONFIDENCE) / 2)) / np.sqrt(N)
+    decisive = [reference.names.index(name) for name in deciding_names(reference)]
+    errors = {reference.names[i]: float(e[i]) for i in decisive} | {"rho": _relative_change(rho, rho_ls)}
+    verdict, decided_by = _verdict(errors)
+    needed = runs_needed(float(spread[decisive].max(initial=0.0)))
+    return LevelResult(
+        level=level,
+        runs=runs,
+        mean=mean,
+        sigma=sigma,
+        relative_sigma=relative_sigma,
+        e=e,
+        half_width=half * sigma,
+        half_width_percent=half * spread,
+        e_rho=errors["rho"],
+        e_rho_own=_relative_change(own, rho_ls),
+        increase=100 * (rho - rho_ls) / norm_Y,
+        increase_own=100 * (own - rho_ls) / norm_Y,
+        verdict=verdict,
+        residual_verdict=_judged(100 * abs(rho - rho_ls) / norm_Y),
+        decided_by=decided_by,
+        runs_needed=needed,
+        message=_message(verdict, decided_by, reference, decisive, N, float(half * spread[decisive].max(initial=0.0)), needed),
+    )
+
+
+def runs_needed(spread: float) -> int:
+    """Fewest runs whose Student interval of the mean is narrower than NEGLIGIBLE on either side; spread : 100 sigma / |X_LS|."""
+    N = np.arange(2, MOST_RUNS + 1)
+    enough = stdtrit(N - 1, (1 + CONFIDENCE) / 2) * spread / np.sqrt(N) < NEGLIGIBLE
+    return int(N[np.argmax(enough)]) if enough.any() else MOST_RUNS
+
+
+def _verdict(errors: Mapping[str, float]) -> tuple[str, dict[str, float]]:
+    """Verdict, and the errors that decided it, largest first; the largest one alone when all are negligible."""
+    ordered = sorted(errors.items(), key=lambda item: -item[1])
+    verdict = _judged(ordered[0][1])
+    if verdict == "unbiased":
+        return verdict, dict(ordered[:1])
+    limit = BIASED if verdict == "biased" else NEGLIGIBLE
+    return verdict, {name: value for name, value in ordered if value >= limit}
+
+
+def _judged(error: float) -> str:
+    """Verdict of one error, in %."""
+    return "unbiased" if error < NEGLIGIBLE else "biased" if error > BIASED else "doubtful"
+
+
+def _message(
+    verdict: str, decided_by: Mapping[str, float], reference: Estimate, decisive: Sequence[int], N: int, half: float, needed: int
+) -> str:
+    named = ", ".join(f"{name} {value:.2f} %" for name, value in decided_by.items())
+    undecided = [name for i, name in enumerate(reference.names) if i not in decisive]
+    text = {
+        "unbiased": f"practically unbiased, all errors of the deciding parameters below {NEGLIGIBLE:g} % (largest: {named}).",
+        "doubtful": f"doubtful, errors between {NEGLIGIBLE:g} and {BIASED:g} %: {named}.",
+        "biased": f"biased, errors above {BIASED:g} %: {named}.",
+    }[verdict]
+    if undecided:
+        text += f" Not deciding, since their own %sigma exceeds {DECIDING:g} %: {', '.join(undecided)}."
+    if half >= NEGLIGIBLE:
+        text += f" {N} runs leave means uncertain by {half:.1f} %; about {needed} runs make that {NEGLIGIBLE:g} %."
+    return text
+
+
+def _relative_change(norm: float, of: float) -> float:
+    """Eq. (22), in %."""
+    return 100 * abs(1 - norm / of) if of > 0 else float("inf" if norm > 0 else 0.0)

@@ -1,1 +1,0 @@
-"""Studies that need one optional library each."""

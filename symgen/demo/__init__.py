@@ -1,0 +1,1 @@
+"""The two demonstrations of the chapter, beside its published tables."""
