@@ -32,7 +32,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/settings/yaml.py"),
     "sympy": ("symgen/regroup/symbolic.py",),
     "mpmath": ("symgen/derive/precise.py", "symgen/regroup/general.py"),
-    "casadi": ("symgen/derive/lagrange.py", "runtime/studies/simulation", "runtime/excitation/search.py", "generated/"),
+    "casadi": ("symgen/derive/lagrange.py", "runtime/motion/", "runtime/excitation/search.py", "generated/"),
     "pooch": ("runtime/records/datasets.py",),
     "pint": ("runtime/settings/units.py",),
     "mujoco": ("symgen/description/mjcf.py",),
@@ -156,7 +156,7 @@ def test_no_two_modules_import_each_other_by_any_way() -> None:
 
 
 def test_files_are_of_a_readable_length() -> None:
-    assert {p.as_posix(): n for p in FILES if (n := len((ROOT / p).read_text(encoding="utf-8").splitlines())) > 400} == {}
+    assert {p.as_posix(): n for p in FILES if p.parts[0] != "generated" and (n := len((ROOT / p).read_text(encoding="utf-8").splitlines())) > 400} == {}
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -245,8 +245,8 @@ def test_refusals(planar):
 def test_another_interface_is_refused(tmp_path):
     (tmp_path / "other.c").write_text(fused.SOURCE.read_text().replace("#define ABI 1", "#define ABI 77"))
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))))
-    (tmp_path / "fused.c").write_text((tmp_path / "other.c").read_text())
-    subprocess.run([compiler, "-std=c11", "-O0", "-shared", "-fPIC", "fused.c", "-o", "other.so"], cwd=tmp_path, check=True)
+    (tmp_path / "kernels.c").write_text((tmp_path / "other.c").read_text())
+    subprocess.run([compiler, "-std=c11", "-O0", "-shared", "-fPIC", "kernels.c", "-o", "other.so"], cwd=tmp_path, check=True)
     with pytest.raises(NotCompiledError, match="interface 77"):
         fused._opened(tmp_path / "other.so")
 
@@ -272,7 +272,7 @@ def test_clean_under_sanitizers_and_the_same_numbers(variant, tmp_path):
     """A driver with arrays of exact size, which prints a checksum of every result; the plain loops give the same to rounding."""
     sums = {}
     for flags in (["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", variant], ["-O3"]):
-        (tmp_path / "fused.c").write_text(fused.SOURCE.read_text())
+        (tmp_path / "kernels.c").write_text(fused.SOURCE.read_text())
         (tmp_path / "driver.c").write_text(DRIVER)
         compiler = next(filter(None, map(shutil.which, ("gcc", "clang", "cc"))))
         line = [compiler, "-std=c11", "-ffp-contract=off", *flags, "driver.c", "-o", "driver"]
@@ -290,7 +290,7 @@ def test_clean_under_sanitizers_and_the_same_numbers(variant, tmp_path):
 
 
 DRIVER = r"""
-#include "fused.c"
+#include "kernels.c"
 #include <stdio.h>
 #include <stdlib.h>
 static uint32_t seed = 1;

@@ -143,18 +143,18 @@ struct kernels {
 #else
 #define WIDTH 1
 #endif
-#include "fused.c"
+#include "kernels.c"
 #ifdef WIDER
 #define NAME(x) x##_fma
 #define TARGET __attribute__((target("fma")))
 #define TOGETHER 2
 #define WIDTH 4
-#include "fused.c"
+#include "kernels.c"
 #define NAME(x) x##_avx512
 #define TARGET __attribute__((target("avx512f")))
 #define TOGETHER 8
 #define WIDTH 8
-#include "fused.c"
+#include "kernels.c"
 #endif
 
 /* Those of this processor. */
