@@ -1,18 +1,23 @@
 """Robots over the prime field F_p: an algebra in which random states and geometries are exact.
 
 p < 2**31, so products fit in int64. p = 3 (mod 4): 1 + t**2 is never 0 and every angle is a point ((1 - t**2)/(1 + t**2), 2t/(1 + t**2)) of
-the unit circle. The points form a group of order p + 1; p is chosen so that this order is a multiple of 2D, D the common
-denominator of the robot's angles in units of pi: pi/3 or pi/4 are then exact roots of unity of F_p, not approximations.
-A fixed angle that is no multiple of pi is transcendental, hence a random point; its rational multiples are powers of that point.
+the unit circle. The points form a group of order p + 1; p is chosen so that this order is a multiple of 2D, D the common denominator of
+the robot's fractions of pi: pi/3 or pi/4 are then exact roots of unity of F_p, not approximations.
 
-Square roots of rationals lie in the same cyclotomic field and are taken from the same root of unity, so that sqrt(3)/2 is cos(pi/6) and
-never -cos(pi/6). For an odd prime l, by Gauss, with the Legendre symbol (k/l) (Ireland and Rosen, A Classical Introduction to Modern Number
-Theory, 6.4):
+Every other fixed angle is a whole multiple of a unit, and each unit is a random point. Units are radians and multiples of constants
+(transcendental against all algebraic numbers), and fractions of pi with a large denominator, whose minimal polynomial has a degree of the order of
+that denominator. Multiples are at most LARGEST_MULTIPLE, so that degrees stay small against p.
+
+Square roots of rationals lie in the cyclotomic field of the fractions of pi and are taken from the same root of unity, so that sqrt(3)/2 is
+cos(pi/6) and never -cos(pi/6). For an odd prime l, by Gauss, with the Legendre symbol (k/l) (Ireland and Rosen, A Classical Introduction to Modern
+Number Theory, 6.4):
 
     sqrt(l) = sum_k (k/l) cos(2 pi k/l)  if l = 1 (mod 4),      sum_k (k/l) sin(2 pi k/l)  if l = 3 (mod 4),      sqrt(2) = 2 cos(pi/4).
 
-Directions of motion: sign(sd) = 2b - 1 with a random field value b for each class of proportional rows G; max(sd, 0) = b sd. Everything is
-linear in b, so a generic b proves what bits would.
+pi as a number is a random residue: it is transcendental. A `Number` has its value, or a residue where `geometry` gives one.
+
+Directions of motion: sign(sd) = 2b - 1 with a random field value b for each class of proportional rows G; max(sd, 0) = b sd. A column is
+linear in each b, so an identity that holds for every b in F_p holds for b = 0 and b = 1.
 """
 
 from __future__ import annotations
@@ -20,17 +25,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from functools import lru_cache
-from math import isqrt, lcm, prod
+from itertools import combinations, product
+from math import gcd, lcm
 
 import numpy as np
 
 from symgen.derive.scalar import Scalar, Turn
-from symgen.description.expression import Call, Expression, Monomial, call, quarter_turns
+from symgen.description.expression import Call, Expression, Monomial, Number, call, quarter_turns
 from symgen.description.robot import Robot
 
 Array = np.ndarray
 PI: Monomial = (("pi", 1),)
 LARGEST_RADICAND = 100  # roots of larger primes are drawn by themselves: their fields share nothing with angles of small denominator
+LARGEST_DENOMINATOR, LARGEST_ORDER = 360, 100_000  # of a fraction of pi, and of all of them together
+LARGEST_MULTIPLE = 16  # of a unit angle
+
+Unit = tuple[Monomial, Fraction]  # the angle fraction * monomial
+Variable = str | Number | Call | Unit  # what a geometry may give: a constant, "pi", a number, a square root, a unit angle
 
 
 class Fp:
@@ -87,15 +98,67 @@ def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
     return tuple(found)
 
 
-def angle_denominators(robot: Robot) -> dict[Monomial, int]:
-    """{monomial: D}: every fixed angle is a sum of whole multiples of monomial/D; the square roots need 2 pi/l and pi/4."""
-    D: dict[Monomial, int] = {PI: 2}
-    for l in radicands(robot):
-        D[PI] = lcm(D[PI], 4 if l == 2 else l)
-    for e in fixed_angles(robot):
-        for m, c in e.terms.items():
-            D[m] = lcm(D.get(m, 1), c.denominator)
-    return D
+class Units:
+    """The unit angles of a robot: `of` writes a fixed angle as a sum of whole multiples of them.
+
+    pi/D is the first, D the common denominator of its moderate fractions of pi and of those that its square roots need.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.D = 2
+        for l in radicands(robot):
+            self.D = lcm(self.D, 4 if l == 2 else l if l < LARGEST_RADICAND else 1)
+        self.free: dict[Monomial, list[Fraction]] = {}
+        angles = fixed_angles(robot)
+        for c in sorted({e.terms.get(PI, Fraction(0)) for e in angles}, key=lambda c: c.denominator):
+            if c.denominator <= LARGEST_DENOMINATOR and lcm(self.D, c.denominator) <= LARGEST_ORDER:
+                self.D = lcm(self.D, c.denominator)
+        amounts: dict[Monomial, list[Fraction]] = {}
+        for e in angles:
+            for m, c in e.terms.items():
+                if m != PI:
+                    amounts.setdefault(m, []).append(abs(c))
+        for m, found in amounts.items():
+            common = lcm(*(c.denominator for c in found))
+            unit = Fraction(gcd(*(int(c * common) for c in found)), common)
+            if max(found) / unit <= LARGEST_MULTIPLE:
+                self.free[m] = [unit]
+        for e in angles:
+            self.of(e)
+
+    @property
+    def all(self) -> list[Unit]:
+        """pi/D, then the free ones."""
+        return [(PI, Fraction(1, self.D)), *((m, c) for m, found in self.free.items() for c in found)]
+
+    def of(self, angle: Expression) -> list[tuple[Unit, int]]:
+        """[(unit, whole multiple)]; an amount that is no small multiple of known units becomes a unit."""
+        return [(unit, k) for m, c in angle.terms.items() for unit, k in self._multiples(m, c)]
+
+    def _multiples(self, m: Monomial, c: Fraction) -> list[tuple[Unit, int]]:
+        turns = [((PI, Fraction(1, self.D)), int(c * self.D))]
+        if m == PI and (c * self.D).denominator == 1:
+            return turns
+        free = self.free.setdefault(m, [])
+        small = [k for n in range(1, LARGEST_MULTIPLE + 1) for k in (n, -n)]
+        for unit, k in product(free, small):
+            rest = (c - k * unit) * self.D
+            if rest == 0:
+                return [((m, unit), k)]
+            if m == PI and rest.denominator == 1:
+                return [((m, unit), k), ((PI, Fraction(1, self.D)), int(rest))]
+        for (u, v), k, n in product(combinations(free, 2), small[:8], small[:8]):
+            rest = (c - k * u - n * v) * self.D
+            if rest == 0 or (m == PI and rest.denominator == 1):
+                return [((m, u), k), ((m, v), n), *([((PI, Fraction(1, self.D)), int(rest))] if rest else [])]
+        free.append(abs(c))
+        return [((m, abs(c)), 1 if c > 0 else -1)]
+
+
+@lru_cache(maxsize=64)
+def units_of(robot: Robot) -> Units:
+    """The unit angles of `robot`."""
+    return Units(robot)
 
 
 def _angles(robot: Robot) -> Iterator[Expression]:
@@ -111,7 +174,7 @@ def _calls(robot: Robot) -> Iterator[Call]:
     """Functions in lengths, gravity and the rows of elements."""
     lengths = [e for f in robot.frames for e in (f.b, f.d, f.r0)]
     rows = [c for e in robot.elements for table in (e.along, e.form) for row in table.values() for c in row.values()]
-    pending = [*robot.gravity, *lengths, *rows]
+    pending = [*robot.gravity, *lengths, *rows, *robot.constraints.values()]
     while pending:
         for a in pending.pop().atoms:
             if isinstance(a, Call):
@@ -120,32 +183,28 @@ def _calls(robot: Robot) -> Iterator[Call]:
 
 
 def radicands(robot: Robot) -> tuple[int, ...]:
-    """The primes below LARGEST_RADICAND under square roots of rational numbers."""
+    """The whole numbers under square roots: primes, and what no small prime divides."""
     arguments = {a.argument.constant for a in _calls(robot) if a.function == "sqrt"}
-    found = {l for c in arguments if c is not None for l in prime_factors(c.numerator * c.denominator)[0]}
-    return tuple(sorted(found))
+    return tuple(sorted({int(c) for c in arguments if c is not None}))
 
 
-def prime_factors(n: int) -> tuple[tuple[int, ...], int]:
-    """The primes below LARGEST_RADICAND that divide n to an odd power, and the part of n that is free of such primes."""
-    odd: list[int] = []
-    for l in range(2, LARGEST_RADICAND):
-        times = 0
-        while n % l == 0:
-            n, times = n // l, times + 1
-        if times % 2:
-            odd.append(l)
-    return tuple(odd), n
+def roots_of(robot: Robot) -> tuple[Call, ...]:
+    """The square roots in lengths, gravity, ratios and rows of elements."""
+    return tuple(dict.fromkeys(a for a in _calls(robot) if a.function == "sqrt"))
 
 
 @lru_cache
-def primes_for(denominator: int, count: int) -> tuple[int, ...]:
-    """The largest `count` primes p < 2**31 with 4 and 2 `denominator` dividing p + 1."""
-    step = lcm(4, 2 * denominator)
-    p = (2**31) // step * step - 1
+def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
+    """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, in which the radicands are squares: the largest, or below a random place."""
+    step = lcm(4, 2 * units_of(robot).D)
+    top = 2**31 if seed is None else int(np.random.default_rng(seed).integers(2**30, 2**31))
+    squares = [c for c in radicands(robot) if c >= LARGEST_RADICAND]
+    p = top // step * step - 1
     found: list[int] = []
     while len(found) < count:
-        if _is_prime(p):
+        if p < 2**20:
+            raise ArithmeticError(f"no prime below 2**31 for angles pi/{step // 2} and the square roots of {squares}")
+        if _is_prime(p) and all(pow(c, (p - 1) // 2, p) == 1 for c in squares):
             found.append(p)
         p -= step
     return tuple(found)
@@ -188,23 +247,24 @@ class Draw:
         samples: int,
         *,
         p: int | None = None,
-        geometry: Mapping[str | Monomial, Array] | None = None,
+        geometry: Mapping[Variable, Array] | None = None,
         count: int = 0,
     ) -> None:
         self.robot, self.samples = robot, samples
         self.shape = (count, samples) if geometry is not None else (samples,)
         self._geometry = geometry or {}
-        self.denominators = angle_denominators(robot)
-        self.p = p if p is not None else primes_for(self.denominators[PI], 1)[0]
+        self.units = units_of(robot)
+        self.p = p if p is not None else primes_for(robot, 1)[0]
         self.rng = np.random.default_rng(seed)
         for _ in range(200):
-            self._constants = {name: self._geometry[name] if name in self._geometry else self._random(1) for name in robot.constants}
-            self._angles: dict[Monomial, Point] = {}
+            names = (*robot.constants, "pi")
+            self._constants = {name: self._geometry[name] if name in self._geometry else self._random(1) for name in names}
+            self._angles: dict[Unit, Point] = {}
             self._root: Point | None = None
             if self._roots_exist():
                 break
         self._rate: dict[tuple[int, int], Array] = {}
-        self._directions: dict[tuple[tuple[int, Expression], ...], Array] = {}
+        self._directions: dict[tuple[tuple[int, bytes], ...], Array] = {}
         self._q = {j: self._random(samples) for j in robot.moving}
         self._qd = {j: self._random(samples) for j in robot.moving}
         self._qdd = {j: self._random(samples) for j in robot.moving}
@@ -239,24 +299,24 @@ class Draw:
             n >>= 1
         return result
 
-    def _unit(self, m: Monomial) -> Point:
-        """The point of the angle monomial/D; for pi a root of unity of order 2D."""
-        if m not in self._angles:
-            if m in self._geometry:
-                self._angles[m] = self._point_at(self._geometry[m])
+    def _unit(self, unit: Unit) -> Point:
+        """The point of a unit angle; of pi/D a root of unity of order 2D."""
+        if unit not in self._angles:
+            if unit in self._geometry:
+                self._angles[unit] = self._point_at(self._geometry[unit])
             else:
-                self._angles[m] = self._half_turn() if m == PI else self._circle(1)
-        return self._angles[m]
+                self._angles[unit] = self._half_turn() if unit == (PI, Fraction(1, self.units.D)) else self._circle(1)
+        return self._angles[unit]
 
     def _half_turn(self) -> Point:
         """The point of the angle pi/D, a root of unity of order 2D."""
         if self._root is None:
-            self._root = self._root_of_unity(2 * self.denominators[PI])
+            self._root = self._root_of_unity(2 * self.units.D)
         return self._root
 
     def _sqrt_of_prime(self, l: int) -> Array:
         """sqrt(l) as a sum of cosines or sines, see the head of this module."""
-        D = self.denominators[PI]
+        D = self.units.D
         if l == 2:
             return 2 * self._multiple(self._half_turn(), D // 4)[0] % self.p
         turn = self._multiple(self._half_turn(), 2 * D // l)
@@ -272,17 +332,6 @@ class Draw:
             raise ArithmeticError("no square root in this draw")
         return self._fp(root)
 
-    def _sqrt_of_rational(self, c: Fraction) -> Fp:
-        """sqrt(m/n) = sqrt(m n)/n; m n is a square times distinct primes."""
-        product = c.numerator * c.denominator
-        primes, rest = prime_factors(product)
-        square = isqrt(product // rest // prod(primes))
-        root = self._number(Fraction(square, c.denominator))
-        root = root * (self._number(Fraction(isqrt(rest))) if isqrt(rest) ** 2 == rest else self._sqrt(self._number(Fraction(rest))))
-        for l in primes:
-            root = root * self._fp(self._sqrt_of_prime(l))
-        return root
-
     def _root_of_unity(self, order: int) -> Point:
         """A point of that order, a multiple of 4, a quarter of which is (0, 1)."""
         while True:
@@ -296,8 +345,8 @@ class Draw:
         turns, rest = quarter_turns(e)
         quarter = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns % 4]
         point: Point = (np.array([quarter[0] % self.p]), np.array([quarter[1] % self.p]))
-        for m, c in rest.terms.items():
-            point = self._turned(point, self._multiple(self._unit(m), int(c * self.denominators[m])))
+        for unit, k in self.units.of(rest):
+            point = self._turned(point, self._multiple(self._unit(unit), k))
         return point
 
     def _roots_exist(self) -> bool:
@@ -315,7 +364,10 @@ class Draw:
         c = e.constant
         if c is not None and c in (0, 1, -1):
             return int(c)
-        return e.evaluate(lambda name: self._fp(self._constants[name]), self._call, self._number)
+        return e.evaluate(lambda name: self._fp(self._constants[name]), self._call, self._number, self._kept)
+
+    def _kept(self, number: Number) -> Fp:
+        return self._fp(self._geometry[number]) if number in self._geometry else self._number(number.value)
 
     def _number(self, c: Fraction) -> Fp:
         return self._fp(np.array([c.numerator * pow(c.denominator, -1, self.p) % self.p]))
@@ -323,9 +375,12 @@ class Draw:
     def _call(self, function: str, argument: Expression) -> Fp:
         if function in ("cos", "sin"):
             return self._fp(self._angle(argument)[function == "sin"])
+        root = Call(function, argument)
+        if root in self._geometry:
+            return self._fp(self._geometry[root])
         c = argument.constant
-        if function == "sqrt" and c is not None:
-            return self._sqrt_of_rational(c)
+        if function == "sqrt" and c is not None and (c == 2 or 2 < c < LARGEST_RADICAND):
+            return self._fp(self._sqrt_of_prime(int(c)))
         x = self.constant(argument)
         value = x if isinstance(x, Fp) else self._number(Fraction(x))
         if function == "inv":
@@ -333,7 +388,7 @@ class Draw:
         return self._sqrt(value)
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
-        if not turn:
+        if not turn and not quarter_turns(offset)[1]:
             c, s = (self.constant(call(name, offset)) for name in ("cos", "sin"))
             return c, s
         point = self._angle(offset)
@@ -356,15 +411,18 @@ class Draw:
 
     def _forward(self, row: tuple[tuple[int, Expression], ...]) -> tuple[Fp, int]:
         """b of the direction class of a row, and whether the row runs along (1) or against (-1) it."""
-        lead = row[0][1].constant
-        orientation = 1
-        if lead is not None:
-            row = tuple((i, g * (1 / lead)) for i, g in row)
-            orientation = 1 if lead > 0 else -1
-        if row not in self._directions:
-            self._directions[row] = self._random(self.samples)
-        b = self._fp(self._directions[row])
+        lead = row[0][1]
+        orientation = 1 if lead.value(self.robot.constants) > 0 else -1
+        ratios = [(self._residues(g) * power(self._residues(lead), self.p - 2, self.p) % self.p).tobytes() for _, g in row]
+        key = tuple((i, ratio) for (i, _), ratio in zip(row, ratios, strict=True))
+        if key not in self._directions:
+            self._directions[key] = self._random(self.samples)
+        b = self._fp(self._directions[key])
         return b, orientation
+
+    def _residues(self, e: Expression) -> Array:
+        value = self.constant(e)
+        return value.x if isinstance(value, Fp) else np.array([value % self.p])
 
     def sign(self, rate: Scalar, row: tuple[tuple[int, Expression], ...]) -> Fp:
         b, orientation = self._forward(row)

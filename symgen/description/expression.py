@@ -2,9 +2,10 @@
 
 An expression is kept as a polynomial with rational coefficients
 
-    e = sum_k c_k prod_i atom_i**n_ki ,      atom = symbol or cos(e), sin(e), sqrt(e), inv(e)
+    e = sum_k c_k prod_i atom_i**n_ki ,      atom = symbol, number kept as it is written, or cos(e), sin(e), sqrt(e), inv(e)
 
-so that two equal forms are equal objects; decimals are exact (0.225 = 9/40) and quarter turns leave cos and sin at once.
+so that two equal forms are equal objects; decimals are exact (0.225 = 9/40). Quarter turns leave cos and sin at once, multiples of pi/6
+and pi/4 become their values, square roots of rationals become products of sqrt(prime) to the first power.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import Any
 
-Monomial = tuple[tuple["str | Call", int], ...]
+LARGEST_PRIME = 1000  # of the trial division under square roots
+
+Monomial = tuple[tuple["str | Number | Call", int], ...]
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,21 @@ class Call:
     @cached_property
     def text(self) -> str:
         return f"1/({self.argument})" if self.function == "inv" else f"{self.function}({self.argument})"
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True)
+class Number:
+    """A positive rational that formulas keep as the robot file writes it: 0.4318**2, not 0.18645124. See `regroup.numbers`."""
+
+    value: Fraction
+
+    @cached_property
+    def text(self) -> str:
+        text = decimal(self.value)
+        return f"({text})" if "/" in text else text
 
     def __str__(self) -> str:
         return self.text
@@ -71,8 +89,8 @@ class Expression:
         terms: dict[Monomial, Fraction] = {}
         for m1, c1 in self.terms.items():
             for m2, c2 in Expression.of(other).terms.items():
-                m = _product(m1, m2)
-                terms[m] = terms.get(m, Fraction(0)) + c1 * c2
+                m, c = _with_simple_roots(_product(m1, m2))
+                terms[m] = terms.get(m, Fraction(0)) + c * c1 * c2
         return Expression(terms)
 
     __radd__, __rmul__ = __add__, __mul__
@@ -85,7 +103,8 @@ class Expression:
             return self.inverse() ** -exponent
         if len(self.terms) == 1:
             ((m, c),) = self.terms.items()
-            return Expression({tuple((a, n * exponent) for a, n in m) if exponent else (): c**exponent})
+            m, root = _with_simple_roots(tuple((a, n * exponent) for a, n in m) if exponent else ())
+            return Expression({m: c**exponent * root})
         result = Expression.number(1)
         for _ in range(exponent):
             result = result * self
@@ -97,7 +116,8 @@ class Expression:
             raise ZeroDivisionError
         if len(self.terms) == 1:
             ((m, c),) = self.terms.items()
-            return Expression({tuple((a, -n) for a, n in m): 1 / c})
+            m, root = _with_simple_roots(tuple((a, -n) for a, n in m))
+            return Expression({m: root / c})
         return _atom("inv", self)
 
     def __eq__(self, other: object) -> bool:
@@ -119,7 +139,7 @@ class Expression:
         return self.terms.get(()) if len(self.terms) == 1 else None
 
     @property
-    def atoms(self) -> set[str | Call]:
+    def atoms(self) -> set[str | Number | Call]:
         return {a for m in self.terms for a, _ in m}
 
     @property
@@ -127,12 +147,12 @@ class Expression:
         """Names of all symbols, those inside calls included; `pi` is not a symbol."""
         names: set[str] = set()
         for a in self.atoms:
-            names |= a.argument.symbols if isinstance(a, Call) else {a} - {"pi"}
+            names |= a.argument.symbols if isinstance(a, Call) else {a} - {"pi"} if isinstance(a, str) else set()
         return names
 
     def coefficient(self, *names: str) -> Expression:
         """The cofactor of the monomial `names` (each to the first power per mention) in the other atoms."""
-        wanted: dict[str | Call, int] = {}
+        wanted: dict[str | Number | Call, int] = {}
         for name in names:
             wanted[name] = wanted.get(name, 0) + 1
         terms: dict[Monomial, Fraction] = {}
@@ -150,19 +170,30 @@ class Expression:
             for a, n in m:
                 if isinstance(a, Call):
                     base = call(a.function, a.argument.substitute(values))
+                elif isinstance(a, Number):
+                    base = Expression({((a, 1),): Fraction(1)})
                 else:
                     base = values.get(a, Expression.symbol(a))
                 term = term * base**n
             result = result + term
         return result
 
-    def evaluate(self, value: Callable[[str], Any], function: Callable[[str, Expression], Any], number: Callable[[Fraction], Any]) -> Any:
-        """Fold over any scalars: `value` of a symbol (and of pi), `function(name, argument)` of a call, `number` of a rational."""
+    def evaluate(
+        self,
+        value: Callable[[str], Any],
+        function: Callable[[str, Expression], Any],
+        number: Callable[[Fraction], Any],
+        kept: Callable[[Number], Any] | None = None,
+    ) -> Any:
+        """Fold over any scalars: `value` of a symbol (and of pi), `function(name, argument)` of a call, `number` of a rational.
+
+        `kept` is the value of a Number, by default that of its rational.
+        """
         total: Any = number(Fraction(0))
         for m, c in sorted(self.terms.items(), key=lambda mc: _order(mc[0])):
             term: Any = number(c)
             for a, n in m:
-                base = function(a.function, a.argument) if isinstance(a, Call) else value(a)
+                base = function(a.function, a.argument) if isinstance(a, Call) else value(a) if isinstance(a, str) else kept(a) if kept else number(a.value)
                 factor = base
                 for _ in range(abs(n) - 1):
                     factor = factor * base
@@ -249,26 +280,51 @@ def _product(m1: Monomial, m2: Monomial) -> Monomial:
     return tuple(sorted(((a, n) for a, n in powers.items() if n), key=lambda an: str(an[0])))
 
 
+def _with_simple_roots(m: Monomial) -> tuple[Monomial, Fraction]:
+    """The monomial with every sqrt(rational) to the power 0 or 1, and the rational factor that leaves: sqrt(3)**-1 = sqrt(3)/3."""
+    if not any(n != 1 and isinstance(a, Call) and a.function == "sqrt" for a, n in m):
+        return m, Fraction(1)
+    factor, powers = Fraction(1), []
+    for a, n in m:
+        c = a.argument.constant if isinstance(a, Call) and a.function == "sqrt" else None
+        if c is not None:
+            factor *= c ** (n // 2)
+            n %= 2
+        if n:
+            powers.append((a, n))
+    return tuple(powers), factor
+
+
 def _atom(function: str, argument: Expression) -> Expression:
     return Expression({((Call(function, argument), 1),): Fraction(1)})
 
 
+def _sqrt_of_rational(c: Fraction) -> Expression:
+    """sqrt(m/n) = sqrt(m n)/n, m n = square * product of primes (trial division to LARGEST_PRIME) * rest."""
+    if c < 0:
+        raise ValueError("square root of a negative number")
+    rest, result = c.numerator * c.denominator, Expression.number(Fraction(1, c.denominator))
+    if (whole := _isqrt(rest)) is not None:
+        return result * whole
+    for l in range(2, LARGEST_PRIME):
+        while rest % (l * l) == 0:
+            rest, result = rest // (l * l), result * l
+        if rest % l == 0:
+            rest, result = rest // l, result * _atom("sqrt", Expression.number(l))
+    whole = _isqrt(rest)
+    return result * whole if whole is not None else result * _atom("sqrt", Expression.number(rest))
+
+
 @lru_cache(maxsize=4096)
 def call(function: str, argument: Expression) -> Expression:
-    """cos, sin, tan, sqrt or inv of an expression; quarter turns, signs and perfect squares are taken out exactly."""
+    """cos, sin, tan, sqrt or inv of an expression; quarter turns, signs, perfect squares and cosines that are roots are taken out exactly."""
     if function == "tan":
         return call("sin", argument) * call("cos", argument).inverse()
     if function == "inv":
         return argument.inverse()
     if function == "sqrt":
         c = argument.constant
-        if c is not None:
-            if c < 0:
-                raise ValueError("square root of a negative number")
-            p, q = _isqrt(c.numerator), _isqrt(c.denominator)
-            if p is not None and q is not None:
-                return Expression.number(Fraction(p, q))
-        return _atom("sqrt", argument)
+        return _atom("sqrt", argument) if c is None else _sqrt_of_rational(c)
     turns, rest = quarter_turns(argument)
     if function == "sin":
         turns -= 1  # sin x = cos(x - pi/2)
@@ -280,6 +336,9 @@ def call(function: str, argument: Expression) -> Expression:
         sign, turns = -sign, turns - 2
     if not rest:
         return Expression.number(sign if turns == 0 else 0)
+    for angle, cosine, sine in ((6, 3, 1), (4, 2, 2), (3, 1, 3)):  # cos(pi/6) = sqrt(3)/2
+        if rest == PI * Fraction(1, angle):
+            return _sqrt_of_rational(Fraction(cosine if turns == 0 else sine, 4)) * (sign if turns == 0 else -sign)
     return _atom("cos", rest) * sign if turns == 0 else _atom("sin", rest) * -sign  # cos(x + pi/2) = -sin x
 
 

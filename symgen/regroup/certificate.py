@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symgen.derive.exact import PI, Array, Draw, Fp, angle_denominators, primes_for
+from symgen.derive.exact import Array, Draw, Fp, primes_for
 from symgen.derive.loops import close
 from symgen.description.expression import Expression
 from symgen.regroup.finite_field import rref
@@ -56,11 +56,11 @@ def certify(regrouping: Regrouping, *, seed: int = 101, sampler: Sampler = sampl
     robot = regrouping.robot
     if close(robot).tied:
         return _certify_general(regrouping, seed)
-    primes = primes_for(angle_denominators(robot)[PI], 2)
+    primes = primes_for(robot, 2)
     failures: list[str] = []
     ranks: list[int] = []
     for k, p in enumerate(primes):
-        draw = Draw(robot, seed + k, states_for(robot, len(regrouping)), p=p)
+        draw = Draw(robot, seed + k, states_for(robot, robot.parameters), p=p)
         W = sampler(draw, robot.parameters)
         index = {name: c for c, name in enumerate(robot.parameters)}
         base = W[:, [index[name] for name in regrouping.own]]

@@ -17,7 +17,7 @@ import numpy as np
 
 from symgen.derive.closure import Closure
 from symgen.derive.columns import columns
-from symgen.derive.exact import Array, Fp, primes_for
+from symgen.derive.exact import Array, Fp
 from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
 from symgen.derive.loop_equations import LoopSystem, loop_system
@@ -26,7 +26,7 @@ from symgen.derive.precise import PreciseAlgebra
 from symgen.description.expression import Call, Expression
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
-from symgen.regroup.solve import Recognition, Supports, Variable, states_for
+from symgen.regroup.solve import MAX_PRIMES, Recognition, Supports, Variable, states_for
 
 DIGITS = 60
 TOLERANCE = mpmath.mpf(10) ** -30
@@ -165,7 +165,7 @@ class PreciseResidues:
 
     def __init__(self, robot: Robot, supports: Supports) -> None:
         self.robot, self.supports = robot, supports
-        self.p = primes_for(2, 1)[0]
+        self.p = 2**31 - 1
         in_angles = {name for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for name in e.symbols}
         in_calls = {
             name
@@ -237,7 +237,7 @@ def nearby_geometry(robot: Robot, seed: int) -> dict[str, Fraction]:
 def base_and_relations(robot: Robot, names: tuple[str, ...]) -> tuple[tuple[str, ...], dict[str, dict[str, Expression]], bool]:
     """Base columns among `names` (in order of preference), {dependent: {base column: coefficient}}, and whether all are exact."""
     with mpmath.workdps(DIGITS):
-        W = States(robot, nearby_geometry(robot, 31), 41).sample(names, states_for(robot, len(names)))
+        W = States(robot, nearby_geometry(robot, 31), 41).sample(names, states_for(robot, names))
         pivots, R = echelon(W)
         base = tuple(names[c] for c in pivots)
         tiny = mpmath.mpf(10) ** -25
@@ -247,7 +247,7 @@ def base_and_relations(robot: Robot, names: tuple[str, ...]) -> tuple[tuple[str,
         reasons: dict[str, str] = {}
         exact: dict[str, list[Expression]] = {}
         if wanted:
-            exact = Recognition(robot, wanted, PreciseResidues(robot, wanted), reasons).coefficients()
+            exact = Recognition(robot, wanted, [PreciseResidues(robot, wanted), *[None] * MAX_PRIMES].__getitem__, reasons).coefficients()
         relations = {name: dict(zip(supports[name], exact.get(name, []), strict=False)) for name in supports}
         missing = [name for name in wanted if name not in exact]
         if missing:
@@ -257,7 +257,7 @@ def base_and_relations(robot: Robot, names: tuple[str, ...]) -> tuple[tuple[str,
 
 def _numeric(robot: Robot, base: tuple[str, ...], missing: list[str]) -> dict[str, dict[str, Expression]]:
     """Coefficients as numbers, for the constants of the file alone."""
-    W = States(robot, default_geometry(robot), 43).sample((*base, *missing), states_for(robot, len(base) + len(missing)))
+    W = States(robot, default_geometry(robot), 43).sample((*base, *missing), states_for(robot, (*base, *missing)))
     pivots, R = echelon(W)
     if pivots != list(range(len(base))):
         raise SymgenError("the lengths of the robot file are special: the base columns are dependent there; change them slightly")
@@ -274,7 +274,7 @@ def identities(
     """(rank of the base columns, standard columns that are not what K says) at fresh states, and fresh lengths if the formulas are exact."""
     with mpmath.workdps(DIGITS):
         geometry = nearby_geometry(robot, seed) if exact else default_geometry(robot)
-        W = States(robot, geometry, seed).sample(names, states_for(robot, len(own)))
+        W = States(robot, geometry, seed).sample(names, states_for(robot, own))
         column = {name: c for c, name in enumerate(names)}
         rank = len(echelon([[row[column[name]] for name in own] for row in W])[0])
         algebra = PreciseAlgebra(robot, geometry, {})

@@ -17,6 +17,7 @@ from symgen.description.expression import ONE, ZERO, Call, Expression
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.regroup.finite_field import rref
 from symgen.regroup.general import base_and_relations
+from symgen.regroup.numbers import numbered
 from symgen.regroup.rules import Combination, Step, Transfer
 from symgen.regroup.solve import coefficients, sample, states_for
 
@@ -74,18 +75,20 @@ class Regrouping:
 
 def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     """Derive the base parameters of `robot`. `seed` changes the random draws, never the result."""
+    given, robot = robot, numbered(robot)
     transfer = Transfer(robot)
     names = preference(robot, transfer.kept)
     if close(robot).tied:
-        return _regroup_general(robot, transfer, names)
-    samples = states_for(robot, len(names))
+        transfer = Transfer(given)
+        return _regroup_general(given, transfer, preference(given, transfer.kept))
+    samples = states_for(robot, names)
     draw = Draw(robot, seed, samples)
     pivots, R = rref(sample(draw, names), draw.p)
     base = tuple(names[c] for c in pivots)
     dependent = [c for c in range(len(names)) if c not in pivots]
     supports = {names[c]: tuple(base[k] for k in range(len(base)) if R[k, c]) for c in dependent}
     relations = {name: dict(zip(supports[name], found, strict=True)) for name, found in coefficients(robot, supports).items()}
-    return _assemble(robot, transfer, base, relations, draw)
+    return replace(_assemble(robot, transfer, base, relations, draw), robot=given)
 
 
 def _regroup_general(robot: Robot, transfer: Transfer, names: tuple[str, ...]) -> Regrouping:
@@ -140,7 +143,7 @@ def _assemble(
 
 def _vanishes(c: Expression, draw: Draw) -> bool:
     """Whether a coefficient is zero, cos(pi/4)**2 - sin(pi/4)**2 included: angles are exact over F_p."""
-    if not any(isinstance(a, Call) for a in c.atoms):
+    if all(isinstance(a, str) for a in c.atoms):
         return not c
     value = draw.constant(c)
     return not value.x.any() if isinstance(value, Fp) else value == 0

@@ -5,32 +5,38 @@ time shows which ones matter. The rest is linear algebra: beta = P/Q with P, Q p
 
     sum_m P_m m(g) - beta(g) sum_m Q_m m(g) = 0     at more random geometries g than there are unknowns,
 
-a nullspace over F_p whose entries are then read as small rationals. Nothing is assumed of the result: the certificate checks it.
+a nullspace over F_p whose entries are then read as rationals, over as many primes as they need. What may vary is tried from much to little: the
+numbers of the file, square roots and all fixed angles as indeterminates; fractions of pi at their values; everything at its value, for a relation that
+holds for these numbers alone. Nothing is assumed of the result: the certificate checks it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from itertools import combinations, combinations_with_replacement, product
+from math import isqrt
 from typing import Protocol
 
 import numpy as np
 
 from symgen.derive.columns import columns
-from symgen.derive.exact import PI, Array, Draw, Fp, angle_denominators, fixed_angles
+from symgen.derive.exact import PI, Array, Draw, Fp, Variable, fixed_angles, primes_for, roots_of, units_of
 from symgen.derive.geometry import Geometry
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion
-from symgen.description.expression import ONE, Expression, Monomial, call
+from symgen.description.expression import Call, Expression, Number
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
 from symgen.regroup.finite_field import rref, small_rational, solve_each
+from symgen.regroup.numbers import numbers_of
 
 MAX_UNKNOWNS = 900
+MAX_PRIMES = 40  # of 31 bits each: numerators and denominators of some 180 digits
+FREEDOMS = (("numbers", "pi"), ("numbers",), ())  # what is an indeterminate beside constants and transcendental angles
 DEGREES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (3, 0), (3, 2), (3, 3), (4, 0), (4, 4), (6, 0), (6, 6))
 
-Variable = str | Monomial  # a constant's name, or the unit of a fixed angle
+Products = Sequence[tuple[Expression, ...]]
 Supports = Mapping[str, tuple[str, ...]]  # {dependent column: the base columns it is a combination of}
 
 
@@ -47,9 +53,15 @@ def sample(draw: Draw, names: tuple[str, ...]) -> Array:
     return np.moveaxis(W.reshape(len(names), -1, *draw.shape[:-1]), (0, 1), (-1, -2))
 
 
-def states_for(robot: Robot, n_columns: int) -> int:
-    """Enough random states for the rank of `n_columns` columns to be seen."""
-    return -(-(n_columns + 10) // len(robot.joints)) + 4
+def states_for(robot: Robot, names: Sequence[str]) -> int:
+    """Random states that show the rank of the columns `names`.
+
+    The columns that act on the joints of a set S alone need |columns| <= states |S| rows: counted for the set of every column, and for all joints.
+    """
+    acts = sample(Draw(robot, 5, 2), tuple(names)).reshape(len(robot.joints), 2, len(names)).any(axis=1).T
+    sets = np.unique(np.vstack([acts[acts.any(axis=1)], np.ones((1, len(robot.joints)), dtype=bool)]), axis=0)
+    needed = max(np.count_nonzero((acts <= S).all(axis=1)) / np.count_nonzero(S) for S in sets)
+    return int(np.ceil(needed + 10 / len(robot.joints))) + 4
 
 
 def coefficients(robot: Robot, supports: Supports) -> dict[str, list[Expression]]:
@@ -57,10 +69,10 @@ def coefficients(robot: Robot, supports: Supports) -> dict[str, list[Expression]
     supports = {name: support for name, support in supports.items() if support}
     result: dict[str, list[Expression]] = {}
     reasons: dict[str, str] = {}
-    for free_pi in (True, False):  # fractions of pi as any angle, if the relation holds for any; else at their exact values
+    for free in FREEDOMS:
         left = {name: support for name, support in supports.items() if name not in result}
         if left:
-            recognition = Recognition(robot, left, Residues(robot, left, free_pi), reasons)
+            recognition = Recognition(robot, left, lambda k, free=free, left=left: Residues(robot, left, free, k), reasons)
             result |= recognition.coefficients()
     for name in supports:
         if name not in result:
@@ -92,40 +104,87 @@ class Source(Protocol):
 class Residues:
     """Coefficients over F_p, for serial robots, trees and parallelograms."""
 
-    def __init__(self, robot: Robot, supports: Supports, free_pi: bool) -> None:
+    def __init__(self, robot: Robot, supports: Supports, free: Sequence[str], k: int) -> None:
         self.robot, self.supports = robot, supports
-        self.samples = -(-(max(map(len, supports.values())) + 7) // len(robot.joints)) + 2
+        self.samples = max(states_for(robot, (*support, d)) for d, support in supports.items())
         self.names = tuple(dict.fromkeys(name for d, support in supports.items() for name in (*support, d)))
-        denominators = angle_denominators(robot)
-        units = [m for m in denominators if m != PI or (free_pi and denominators[PI] > 2)]
-        self.variables: tuple[Variable, ...] = (*robot.constants, *units)
-        self.p = Draw(robot, 0, 1).p
-        self.rng = np.random.default_rng(len(supports))
+        whole = (PI, Fraction(1, units_of(robot).D))
+        units = [u for u in units_of(robot).all if u != whole or ("pi" in free and fixed_angles(robot))]
+        numbers = [*numbers_of(robot), *roots_of(robot)] if "numbers" in free else []
+        self.variables: tuple[Variable, ...] = (*robot.constants, "pi", *units, *numbers)
+        self.p = primes_for(robot, k + 1)[k]
+        self.rng = np.random.default_rng(len(supports) + 1000 * k)
 
     def random(self, count: int) -> dict[Variable, Array]:
         return {v: self.rng.integers(2, self.p, (count, 1)) for v in self.variables}
 
     def beta(self, geometry: dict[Variable, Array], count: int) -> dict[str, Array | None]:
-        draw = Draw(self.robot, 11, self.samples, geometry=geometry, count=count)
+        draw = Draw(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
         W = np.broadcast_to(sample(draw, self.names), (count, len(self.robot.joints) * self.samples, len(self.names)))
         index = {name: k for k, name in enumerate(self.names)}
         return {d: solve_each(W[:, :, [index[name] for name in (*s, d)]], self.p, self.rng) for d, s in self.supports.items()}
 
     def value(self, geometry: dict[Variable, Array], count: int, e: Expression) -> Array:
-        value = Draw(self.robot, 11, 1, geometry=geometry, count=count).constant(e)
+        value = Draw(self.robot, 11, 1, p=self.p, geometry=geometry, count=count).constant(e)
         return value.x.reshape(-1) if isinstance(value, Fp) else np.full(1, value % self.p)
 
 
-class Recognition:
-    """Expressions from residues at a growing pool of random geometries."""
+class Pool:
+    """Residues of the coefficients at a growing number of random geometries over one prime."""
 
-    def __init__(self, robot: Robot, supports: Supports, source: Source, reasons: dict[str, str]) -> None:
-        self.robot, self.supports, self.source, self.p = robot, supports, source, source.p
-        self.reasons = reasons
-        self.geometry = source.random(0)
+    def __init__(self, source: Source, supports: Supports) -> None:
+        self.source, self.p = source, source.p
         self.count = 0
-        self.pool: dict[str, Array | None] = {name: np.zeros((0, len(support)), dtype=np.int64) for name, support in supports.items()}
+        self.geometry = source.random(0)
+        self.beta: dict[str, Array | None] = {name: np.zeros((0, len(support)), dtype=np.int64) for name, support in supports.items()}
         self.values: dict[Expression, Array] = {}
+
+    def grow(self, count: int) -> None:
+        """At least `count` geometries."""
+        if count <= self.count:
+            return
+        more = max(count - self.count, self.count, 12)
+        geometry = self.source.random(more)
+        beta = self.source.beta(geometry, more)
+        self.geometry = {v: np.concatenate([self.geometry[v], geometry[v]]) for v in geometry} if self.count else geometry
+        self.count += more
+        for name, b in beta.items():
+            old = self.beta[name]
+            self.beta[name] = None if b is None or old is None else np.concatenate([old, b])
+        self.values.clear()
+
+    def value(self, m: tuple[Expression, ...]) -> Array:
+        """Residues of a product at the geometries."""
+        total = np.ones(self.count, dtype=np.int64)
+        for e in m:
+            if e not in self.values:
+                self.values[e] = self.source.value(self.geometry, self.count, e)
+            total = total * self.values[e] % self.p
+        return total
+
+    def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
+        """{place among [*Q, *P]: residue} of the first relation among the columns, or None where there is none."""
+        count = len(P) + len(Q) + 4
+        self.grow(count)
+        beta = self.beta[name]
+        if beta is None:
+            return None
+        columns = [-beta[:count, k] * self.value(m)[:count] % self.p for m in Q] + [self.value(m)[:count] for m in P]
+        pivots, R = rref(np.stack(columns, axis=1), self.p)
+        free = next((c for c in range(len(columns)) if c not in pivots), None)
+        if free is None:
+            return None
+        return {c: -int(R[i, free]) % self.p for i, c in enumerate(pivots) if c < free and R[i, free]} | {free: 1}
+
+
+class Recognition:
+    """Expressions from residues. `source(k)` gives them over the k-th prime, None where there is no such prime."""
+
+    def __init__(self, robot: Robot, supports: Supports, source: Callable[[int], Source | None], reasons: dict[str, str]) -> None:
+        self.robot, self.supports, self.source, self.reasons = robot, supports, source, reasons
+        first = source(0)
+        assert first is not None
+        self.pools = [Pool(first, supports)]
 
     def coefficients(self) -> dict[str, list[Expression]]:
         """{dependent: coefficients} of those that were recognised."""
@@ -139,10 +198,11 @@ class Recognition:
         return result
 
     def _what_matters(self) -> dict[str, list[list[Variable]]]:
-        variables = self.source.variables
-        reference, changed = self.source.random(1), self.source.random(1)
+        source = self.pools[0].source
+        variables = source.variables
+        reference, changed = source.random(1), source.random(1)
         cases = [reference] + [reference | {v: changed[v]} for v in variables]
-        beta = self.source.beta({v: np.concatenate([case[v] for case in cases]) for v in variables}, len(cases))
+        beta = source.beta({v: np.concatenate([case[v] for case in cases]) for v in variables}, len(cases))
         result: dict[str, list[list[Variable]]] = {}
         for name, b in beta.items():
             if b is None:
@@ -151,80 +211,83 @@ class Recognition:
                 result[name] = [[v for i, v in enumerate(variables, start=1) if b[i, k] != b[0, k]] for k in range(b.shape[1])]
         return result
 
-    def _grow(self, count: int) -> None:
-        if count <= self.count:
-            return
-        more = max(count - self.count, self.count, 12)
-        geometry = self.source.random(more)
-        beta = self.source.beta(geometry, more)
-        self.geometry = {v: np.concatenate([self.geometry[v], geometry[v]]) for v in geometry} if self.count else geometry
-        self.count += more
-        for name, b in beta.items():
-            old = self.pool[name]
-            self.pool[name] = None if b is None or old is None else np.concatenate([old, b])
-        self.values.clear()
-
     def _recognise(self, name: str, k: int, matters: Sequence[Variable]) -> Expression | None:
         for (numerator, denominator), angles in product(DEGREES, self._choices(matters)):
             P, Q = self._monomials(matters, angles, numerator), self._monomials(matters, angles, denominator)
-            count = len(P) + len(Q) + 4
-            if count > MAX_UNKNOWNS or (numerator and len(P) == 1):
+            if len(P) + len(Q) + 4 > MAX_UNKNOWNS or (numerator and len(P) == 1):
                 continue
-            self._grow(count)
-            pool = self.pool[name]
-            if pool is None:
+            vector = self.pools[0].vector(name, k, P, Q)
+            if self.pools[0].beta[name] is None:
                 self.reasons[name] = "the relation does not hold for every geometry"
                 return None
-            p_columns = [self._value(m)[:count] for m in P]
-            q_columns = [-pool[:count, k] * self._value(m)[:count] % self.p for m in Q]
-            found = self._fraction(np.stack([*q_columns, *p_columns], axis=1), Q, P)
-            if found is not None:
-                return found
-        self.reasons[name] = f"no fraction of degree up to {DEGREES[-1]} in {', '.join(map(str, matters)) or 'rational numbers'}"
+            entries = None if vector is None else self._rationals(vector, name, k, P, Q)
+            if entries is not None:
+                return _fraction(entries, P, Q)
+        self.reasons[name] = f"no fraction of degree up to {DEGREES[-1]} in {_texts(matters) or 'rational numbers'}"
+        return None
+
+    def _rationals(self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products) -> dict[int, Fraction] | None:
+        """The vector as rationals: small ones from one prime, others by the Chinese remainder theorem until one more prime agrees."""
+        small = {c: small_rational(x, self.pools[0].p) for c, x in vector.items()}
+        if all(x is not None for x in small.values()):
+            return {c: x for c, x in small.items() if x is not None}
+        residue, modulus = dict(vector), self.pools[0].p
+        for m in range(1, MAX_PRIMES):
+            if m == len(self.pools):
+                source = self.source(m)
+                if source is None:
+                    return None
+                self.pools.append(Pool(source, self.supports))
+            p, other = self.pools[m].p, self.pools[m].vector(name, k, P, Q)
+            if other is None or set(other) != set(vector):
+                return None
+            bound = isqrt(modulus // 2)
+            entries = {c: small_rational(x, modulus, bound) for c, x in residue.items()}
+            known = {c: x for c, x in entries.items() if x is not None and x.denominator % p}
+            if len(known) == len(entries) and all((x.numerator - other[c] * x.denominator) % p == 0 for c, x in known.items()):
+                return known
+            inverse = pow(modulus, -1, p)
+            residue = {c: x + modulus * ((other[c] - x) * inverse % p) for c, x in residue.items()}
+            modulus *= p
         return None
 
     def _choices(self, matters: Sequence[Variable]) -> list[tuple[Expression, ...]]:
         """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all."""
-        units = {v for v in matters if not isinstance(v, str)}
-        angles = [e for e in fixed_angles(self.robot) if units & set(e.terms)]
+        units, known = {v for v in matters if isinstance(v, tuple)}, units_of(self.robot)
+        angles = [e for e in fixed_angles(self.robot) if units & {unit for unit, _ in known.of(e)}]
         choices = [tuple(c) for n in (1, 2) for c in combinations(angles, n)]
         return [*choices, *([tuple(angles)] if len(angles) > 2 else [])] if angles else [()]
 
-    def _monomials(self, matters: Sequence[Variable], angles: Sequence[Expression], degree: int) -> list[tuple[Expression, ...]]:
+    def _monomials(self, matters: Sequence[Variable], angles: Sequence[Expression], degree: int) -> Products:
         """Products of at most `degree` constants, cosines and sines; sin to the first power only, as sin**2 = 1 - cos**2."""
-        sines = [call("sin", e) for e in angles]
-        atoms = [Expression.symbol(v) for v in matters if isinstance(v, str)] + [call("cos", e) for e in angles] + sines
+        sines = [_atom(Call("sin", e)) for e in angles]
+        atoms = [_atom(v) for v in matters if not isinstance(v, tuple)] + [_atom(Call("cos", e)) for e in angles] + sines
         products: list[tuple[Expression, ...]] = []
         for d in range(degree + 1):
             products += [m for m in combinations_with_replacement(atoms, d) if all(m.count(s) < 2 for s in sines)]
         return products
 
-    def _value(self, m: tuple[Expression, ...]) -> Array:
-        total = np.ones(self.count, dtype=np.int64)
-        for e in m:
-            if e not in self.values:
-                self.values[e] = self.source.value(self.geometry, self.count, e)
-            total = total * self.values[e] % self.p
-        return total
 
-    def _fraction(self, M: Array, Q: Sequence[tuple[Expression, ...]], P: Sequence[tuple[Expression, ...]]) -> Expression | None:
-        pivots, R = rref(M, self.p)
-        free = next((c for c in range(M.shape[1]) if c not in pivots), None)
-        if free is None:
-            return None
-        vector = {c: -int(R[i, free]) % self.p for i, c in enumerate(pivots) if c < free} | {free: 1}
-        entries = {c: small_rational(x, self.p) for c, x in vector.items() if x}
-        if any(c is None for c in entries.values()):
-            return None
-        products = [*Q, *P]
-        sides = [Expression(), Expression()]
-        for c, value in entries.items():
-            term = ONE
-            for e in products[c]:
-                term = term * e
-            sides[c >= len(Q)] += term * (value or Fraction(0))
-        denominator, numerator = sides
-        if not denominator:
-            return None
-        lead = denominator.terms[next(iter(denominator.terms))]
-        return numerator * (1 / lead) * (denominator * (1 / lead)).inverse()
+def _fraction(entries: Mapping[int, Fraction], P: Products, Q: Products) -> Expression | None:
+    """P/Q from the coefficients of [*Q, *P]; cosines and roots that have simple values get them."""
+    products = [*Q, *P]
+    sides = [Expression(), Expression()]
+    for c, value in entries.items():
+        term = Expression.number(value)
+        for e in products[c]:
+            term = term * e
+        sides[c >= len(Q)] += term
+    denominator, numerator = (side.substitute({}) for side in sides)
+    if not denominator:
+        return None
+    lead = denominator.terms[next(iter(denominator.terms))]
+    return numerator * (1 / lead) * (denominator * (1 / lead)).inverse()
+
+
+def _atom(a: str | Number | Call) -> Expression:
+    """The indeterminate itself, cos(pi/6) not replaced by its value."""
+    return Expression({((a, 1),): Fraction(1)})
+
+
+def _texts(matters: Sequence[Variable]) -> str:
+    return ", ".join(str(v) if not isinstance(v, tuple) else str(Expression({v[0]: v[1]})) for v in matters)

@@ -1,0 +1,65 @@
+"""A robot whose numbers are kept as written: 0.4318 becomes an atom of the formulas, 0.4318**2*M2 in place of 0.18645124*M2.
+
+Lengths, gravity, mimic ratios and the rows of elements are polynomials over constants; each rational coefficient c of theirs that is no small
+whole number becomes sign(c) `Number(|c|)`. Equal numbers are one atom. The atoms have two uses: formulas read like the robot file, and
+coefficients are recognised at random values of the atoms, as functions of low degree, where the digits of a number are too long for rational
+reconstruction. What is recognised is then checked at the numbers themselves (`certificate`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+
+from symgen.description.expression import Call, Expression, Number, call
+from symgen.description.robot import PRISMATIC, Robot
+
+LARGEST_WHOLE = 12  # whole numbers up to here are counts (2, 4) rather than lengths
+
+
+def numbered(robot: Robot) -> Robot:
+    """`robot` with the numbers of its lengths, gravity, ratios and element rows as `Number` atoms."""
+    frames = tuple(replace(f, b=kept(f.b), d=kept(f.d), r=kept(f.r)) for f in robot.frames)
+    constraints = {j: kept(e) if robot.frame(j).sigma == PRISMATIC else e for j, e in robot.constraints.items()}
+    elements = tuple(replace(e, along=_rows(e.along), form=_rows(e.form)) for e in robot.elements)
+    x, y, z = map(kept, robot.gravity)
+    return replace(robot, frames=frames, gravity=(x, y, z), constraints=constraints, elements=elements)
+
+
+def _rows(table: Mapping[int, Mapping[object, Expression]]) -> dict[int, dict[object, Expression]]:
+    return {j: {i: kept(g) for i, g in row.items()} for j, row in table.items()}
+
+
+def kept(e: Expression) -> Expression:
+    """The same polynomial with its rational coefficients as atoms, those inside square roots and inverses too."""
+    total = Expression()
+    for m, c in e.terms.items():
+        term = Expression({(): Fraction(1 if c > 0 else -1)}) * _atom(abs(c))
+        for a, n in m:
+            inside = isinstance(a, Call) and a.function in ("sqrt", "inv") and a.argument.constant is None
+            base = call(a.function, kept(a.argument)) if inside else Expression({((a, 1),): Fraction(1)})
+            term = term * base**n
+        total = total + term
+    return total
+
+
+def _atom(c: Fraction) -> Expression:
+    if c.denominator == 1 and c.numerator <= LARGEST_WHOLE:
+        return Expression.number(c)
+    return Expression({((Number(c), 1),): Fraction(1)})
+
+
+def numbers_of(robot: Robot) -> tuple[Number, ...]:
+    """The Number atoms of a robot made by `numbered`, in the order of the file."""
+    expressions = [e for f in robot.frames for e in (f.b, f.d, f.r)] + [*robot.gravity, *robot.constraints.values()]
+    expressions += [g for e in robot.elements for table in (e.along, e.form) for row in table.values() for g in row.values()]
+    found: dict[Number, None] = {}
+    while expressions:
+        for m in expressions.pop(0).terms:
+            for a, _ in m:
+                if isinstance(a, Number):
+                    found[a] = None
+                elif isinstance(a, Call):
+                    expressions.append(a.argument)
+    return tuple(found)
