@@ -32,7 +32,7 @@ import numpy as np
 
 from symgen.derive.scalar import Scalar, Turn
 from symgen.description.expression import Call, Expression, Monomial, Number, call, quarter_turns
-from symgen.description.robot import Robot
+from symgen.description.robot import REVOLUTE, Robot
 
 Array = np.ndarray
 PI: Monomial = (("pi", 1),)
@@ -165,8 +165,9 @@ def _angles(robot: Robot) -> Iterator[Expression]:
     for f in robot.frames:
         yield from (f.gamma, f.alpha, f.theta0)
     joints = {f"q{i}": Expression() for i in robot.moving}
-    for e in robot.constraints.values():
-        yield e.substitute(joints)
+    for j, e in robot.constraints.items():
+        if robot.frame(j).sigma == REVOLUTE:
+            yield e.substitute(joints)
     yield from (a.argument for a in _calls(robot) if a.function in ("cos", "sin"))
 
 
@@ -388,7 +389,7 @@ class Draw:
         return self._sqrt(value)
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
-        if not turn and not quarter_turns(offset)[1]:
+        if not turn:
             c, s = (self.constant(call(name, offset)) for name in ("cos", "sin"))
             return c, s
         point = self._angle(offset)

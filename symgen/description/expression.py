@@ -4,8 +4,8 @@ An expression is kept as a polynomial with rational coefficients
 
     e = sum_k c_k prod_i atom_i**n_ki ,      atom = symbol, number kept as it is written, or cos(e), sin(e), sqrt(e), inv(e)
 
-so that two equal forms are equal objects; decimals are exact (0.225 = 9/40). Quarter turns leave cos and sin at once, multiples of pi/6
-and pi/4 become their values, square roots of rationals become products of sqrt(prime) to the first power.
+so that two equal forms are equal objects; decimals are exact (0.225 = 9/40). Quarter turns leave cos and sin at once, square roots of
+rationals become products of sqrt(prime) to the first power.
 """
 
 from __future__ import annotations
@@ -317,7 +317,7 @@ def _sqrt_of_rational(c: Fraction) -> Expression:
 
 @lru_cache(maxsize=4096)
 def call(function: str, argument: Expression) -> Expression:
-    """cos, sin, tan, sqrt or inv of an expression; quarter turns, signs, perfect squares and cosines that are roots are taken out exactly."""
+    """cos, sin, tan, sqrt or inv of an expression; quarter turns, signs and perfect squares are taken out exactly."""
     if function == "tan":
         return call("sin", argument) * call("cos", argument).inverse()
     if function == "inv":
@@ -336,10 +336,25 @@ def call(function: str, argument: Expression) -> Expression:
         sign, turns = -sign, turns - 2
     if not rest:
         return Expression.number(sign if turns == 0 else 0)
-    for angle, cosine, sine in ((6, 3, 1), (4, 2, 2), (3, 1, 3)):  # cos(pi/6) = sqrt(3)/2
-        if rest == PI * Fraction(1, angle):
-            return _sqrt_of_rational(Fraction(cosine if turns == 0 else sine, 4)) * (sign if turns == 0 else -sign)
     return _atom("cos", rest) * sign if turns == 0 else _atom("sin", rest) * -sign  # cos(x + pi/2) = -sin x
+
+
+def with_known_cosines(e: Expression) -> Expression:
+    """The same expression with the values of cos and sin of pi/6, pi/4 and pi/3 in their place."""
+    if not any(isinstance(a, Call) and a.function in ("cos", "sin") and a.argument in KNOWN for a in e.atoms):
+        return e
+    result = Expression()
+    for m, c in e.terms.items():
+        term = Expression({(): c})
+        for a, n in m:
+            square = KNOWN.get(a.argument) if isinstance(a, Call) and a.function in ("cos", "sin") else None
+            if square is None:
+                term = term * Expression({((a, n),): Fraction(1)})
+            else:
+                assert isinstance(a, Call)
+                term = term * _sqrt_of_rational(square if a.function == "cos" else 1 - square) ** n
+        result = result + term
+    return result
 
 
 def quarter_turns(angle: Expression) -> tuple[int, Expression]:
@@ -362,3 +377,6 @@ def _leading(e: Expression) -> Fraction:
 def _isqrt(n: int) -> int | None:
     r = math.isqrt(n)
     return r if r * r == n else None
+
+
+KNOWN = {PI * Fraction(1, n): Fraction(square, 4) for n, square in ((6, 3), (4, 2), (3, 1))}  # angle: cos**2

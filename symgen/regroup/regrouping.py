@@ -13,7 +13,7 @@ from fractions import Fraction
 from symgen.derive.columns import element_names, inertial_names
 from symgen.derive.exact import Draw, Fp
 from symgen.derive.loops import close
-from symgen.description.expression import ONE, ZERO, Call, Expression
+from symgen.description.expression import ONE, ZERO, Call, Expression, with_known_cosines
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.regroup.finite_field import rref
 from symgen.regroup.general import base_and_relations
@@ -133,7 +133,7 @@ def _assemble(
     parameters: list[BaseParameter] = []
     used: set[str] = set()
     for own in sorted(combination, key=order.__getitem__):
-        terms = {name: simplified(c) for name, c in combination[own].items()}
+        terms = {name: simplified(with_known_cosines(c)) for name, c in combination[own].items()}
         terms = {name: c for name, c in sorted(terms.items(), key=lambda nc: (nc[0] != own, order[nc[0]])) if not _vanishes(c, draw)}
         used |= set(terms)
         parameters.append(BaseParameter(own if terms == {own: ONE} else own + "R", own, terms))

@@ -33,6 +33,7 @@ from symgen.regroup.numbers import numbers_of
 
 MAX_UNKNOWNS = 900
 MAX_PRIMES = 40  # of 31 bits each: numerators and denominators of some 180 digits
+MAX_WORK = 1e9  # multiplications of one recognition, some seconds
 FREEDOMS = (("numbers", "pi"), ("numbers",), ())  # what is an indeterminate beside constants and transcendental angles
 DEGREES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (3, 0), (3, 2), (3, 3), (4, 0), (4, 4), (6, 0), (6, 6))
 
@@ -185,6 +186,7 @@ class Recognition:
         first = source(0)
         assert first is not None
         self.pools = [Pool(first, supports)]
+        self.work = 0  # multiplications, roughly
 
     def coefficients(self) -> dict[str, list[Expression]]:
         """{dependent: coefficients} of those that were recognised."""
@@ -216,6 +218,10 @@ class Recognition:
             P, Q = self._monomials(matters, angles, numerator), self._monomials(matters, angles, denominator)
             if len(P) + len(Q) + 4 > MAX_UNKNOWNS or (numerator and len(P) == 1):
                 continue
+            self.work += (len(P) + len(Q)) ** 3
+            if self.work > MAX_WORK:
+                self.reasons[name] = "the search for a fraction of moderate degree took too long"
+                return None
             vector = self.pools[0].vector(name, k, P, Q)
             if self.pools[0].beta[name] is None:
                 self.reasons[name] = "the relation does not hold for every geometry"
