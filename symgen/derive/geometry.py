@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from symgen.derive.closure import Closure
-from symgen.derive.scalar import ZERO3, Algebra, Matrix, Scalar, Turn, Vector, add, apply, apply_transposed, mul, sub
+from symgen.derive.scalar import Algebra, Matrix, Scalar, Turn, Vector, add, apply, apply_transposed, is_zero, mul, sub
 from symgen.description.expression import Expression, call
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
@@ -94,7 +94,7 @@ class Geometry:
 
     def carried(self, j: int, v: Vector) -> Vector:
         """Components in frame j of a vector given in the carrier's frame."""
-        return self.carrier[j].rotation.down(v) if v != ZERO3 else v
+        return v if is_zero(v) else self.carrier[j].rotation.down(v)
 
     def is_inside(self, i: int, j: int) -> bool:
         """Whether joint i turns the carrier of frame j (otherwise it turns about z_j itself)."""

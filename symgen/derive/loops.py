@@ -213,19 +213,30 @@ def _general(
 
 
 def _angle_sum(robot: Robot, loop: Loop, configuration: Mapping[int, float]) -> tuple[dict[int, Expression], Expression] | None:
-    """q_cut in the other angles of a loop of parallel axes: cut and twin frame are turned alike about one axis."""
-    geometry = Geometry(robot, FloatAlgebra(robot, {j: np.asarray(x) for j, x in configuration.items()}), open_tree(robot))
-    cut, twin = geometry.carrier[loop.cut], geometry.carrier[loop.twin]
-    if robot.frame(loop.cut).sigma != REVOLUTE or cut.m != twin.m or cut.rotation.A != twin.rotation.A:
+    """q_cut in the other angles of a planar loop: all its hinges turn about one direction, forwards or backwards, slides and twists between them or not.
+
+    The directions are looked at in two configurations of the open tree; `regroup.general` proves the sum over F_p.
+    """
+    if robot.frame(loop.cut).sigma != REVOLUTE:
         return None
+    branches = [(sign, robot.path(k)) for sign, k in ((1, loop.twin), (-1, loop.cut))]
+    hinges = [(sign, j) for k, (sign, path) in enumerate(branches) for j in path if robot.frame(j).sigma == REVOLUTE and j not in branches[1 - k][1]]
     total: dict[int, int] = {}
-    for sign, frame in ((1, loop.twin), (-1, loop.cut)):
-        for j, n in geometry.turn[frame][0]:
-            total[j] = total.get(j, 0) + sign * n
-    if total.pop(loop.cut, 0) != -1:
-        return None
+    for shift in (0.0, 0.3):
+        q = {j: np.asarray(x + shift * k) for k, (j, x) in enumerate(configuration.items())}
+        pose = frame_poses(Geometry(robot, FloatAlgebra(robot, q), open_tree(robot)))
+        axis = {j: np.array([float(pose[j][0][k][2]) for k in range(3)]) for _, j in hinges}
+        along = {j: float(z @ axis[loop.cut]) for j, z in axis.items()}
+        if any(abs(abs(x) - 1) > 1e-9 for x in along.values()):
+            return None
+        total = {}
+        for sign, j in hinges:
+            total[j] = total.get(j, 0) + sign * round(along[j])
+    del total[loop.cut]
     row = {j: Expression.number(n) for j, n in total.items() if n}
-    offset = geometry.turn[loop.twin][1] - geometry.turn[loop.cut][1]
+    offset = _constant(robot, configuration[loop.cut] - sum(n * configuration[j] for j, n in total.items()))
+    if offset is None:
+        return None
     now = offset.value(robot.constants) + sum(n * configuration[j] for j, n in total.items())
     return row, offset + PI * (2 * round((configuration[loop.cut] - now) / (2 * np.pi)))
 

@@ -69,6 +69,11 @@ class Algebra(Protocol):
         ...
 
 
+def is_zero(v: Vector) -> bool:
+    """Whether all components are the structural zero."""
+    return all(type(x) is int and x == 0 for x in v)
+
+
 def add(a: Scalar, b: Scalar) -> Scalar:
     if type(a) is int and a == 0:
         return b

@@ -17,9 +17,10 @@ import numpy as np
 
 from symgen.derive.exact import Array, Draw, Fp, primes_for
 from symgen.derive.loops import close
-from symgen.description.expression import Expression
+from symgen.description.expression import ZERO, Expression
 from symgen.regroup.finite_field import rref
-from symgen.regroup.general import identities
+from symgen.regroup.general import FloatStates, float_states, identities
+
 from symgen.regroup.regrouping import NUMERIC, Regrouping
 from symgen.regroup.solve import sample, states_for
 
@@ -72,17 +73,33 @@ def certify(regrouping: Regrouping, *, seed: int = 101, sampler: Sampler = sampl
 
 
 def _certify_general(regrouping: Regrouping, seed: int) -> Certificate:
-    """General loops: the same identities in 60 digits, at lengths and states not used before."""
+    """General loops: the identities at random points of the closed mechanism over F_p, the rank at its lengths in floats.
+
+    A smallest singular value far above rounding proves that the base columns are independent.
+    """
     robot = regrouping.robot
     K: dict[str, dict[str, Expression]] = {}
     for b in regrouping.base:
         for name, c in b.combination.items():
             K.setdefault(name, {})[b.own] = c
-    rank, wrong = identities(robot, regrouping.own, robot.parameters, K, seed, regrouping.method != NUMERIC)
-    failures = [f"column of {name} is not what the formulas say (60 digits)" for name in wrong]
-    if rank != len(regrouping):
-        failures.append(f"rank in 60 digits is {rank}, not {len(regrouping)}: the base columns are dependent")
-    return Certificate(len(regrouping), rank, (), len(robot.parameters), tuple(failures))
+    W = FloatStates(robot, seed).regressor(robot.parameters, float_states(robot, robot.parameters))
+    base = W[:, [robot.parameters.index(own) for own in regrouping.own]]
+    rank = numeric_rank(base)[0]
+    failures = [] if rank == len(regrouping) else [f"rank is {rank}, not {len(regrouping)}: the base columns are dependent"]
+    primes = primes_for(robot, 2)
+    try:
+        for k, p in enumerate(primes):
+            wrong = identities(robot, K, regrouping.own, seed + k, p=p)
+            failures += [f"column of {name} is not what the formulas say (modulo {p})" for name in wrong]
+    except ArithmeticError:
+        primes = ()
+    if not primes or regrouping.method == NUMERIC:
+        failures = [f for f in failures if f.startswith("rank")]
+        predicted = base @ np.array([[K.get(name, {}).get(own, ZERO).value(robot.constants) for name in robot.parameters] for own in regrouping.own])
+        off = np.abs(predicted - W).max(axis=0) > 1e-7 * np.abs(W).max()
+        failures += [f"column of {robot.parameters[c]} is not what the formulas say" for c in np.flatnonzero(off)]
+        primes = ()
+    return Certificate(len(regrouping), rank, primes, len(robot.parameters), tuple(failures))
 
 
 def _false_identities(regrouping: Regrouping, draw: Draw, W: Array, index: dict[str, int], base: Array) -> list[str]:

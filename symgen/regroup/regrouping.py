@@ -79,8 +79,7 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     transfer = Transfer(robot)
     names = preference(robot, transfer.kept)
     if close(robot).tied:
-        transfer = Transfer(given)
-        return _regroup_general(given, transfer, preference(given, transfer.kept))
+        return replace(_regroup_general(robot, transfer, names), robot=given)
     samples = states_for(robot, names)
     draw = Draw(robot, seed, samples)
     pivots, R = rref(sample(draw, names), draw.p)
@@ -94,7 +93,7 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
 def _regroup_general(robot: Robot, transfer: Transfer, names: tuple[str, ...]) -> Regrouping:
     base, relations, exact = base_and_relations(robot, names)
     regrouping = _assemble(robot, transfer, base, relations, Draw(robot, 1, 1))
-    return replace(regrouping, method=RECOGNISED if exact else NUMERIC)
+    return replace(regrouping, method=EXACT if exact else NUMERIC)
 
 
 def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
