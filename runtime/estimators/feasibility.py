@@ -1,6 +1,6 @@
 """Can a physical robot have these base parameters, and which standard parameters would it have?
 
-    feasibility(X)            t* = max t: every condition of `runtime.estimators.physical` holds with margin t, and K chi = X. t* < 0: no robot has X
+    feasibility(X)            t* = max t: every condition of `runtime.model.inertia` holds with margin t, and K chi = X. t* < 0: no robot has X
     standard_parameters(X)    chi with K chi = X that fulfils every condition, nearest to the values of the robot file (or to zero)
 
 A negative t* is blamed on the condition with the largest multiplier; that one is released and the rest asked again, until it holds.
@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.physical import INERTIAL, PhysicalModel
 from runtime.estimators.semidefinite import FURTHEST, Distance, Found, Reference, Rows, closest, margin, solutions
+from runtime.model.inertia import INERTIAL, PhysicalModel
 
 Array = np.ndarray
 Interval = tuple[float | None, float | None]

@@ -3,7 +3,7 @@
     min ||R (z - K chi)||^2 + weight D(chi)      subject to  P_j(chi) >= margin 1, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
 
-W is factored once and b rows enter the semidefinite program (`runtime.estimators.semidefinite`); the conditions are those of `runtime.estimators.physical`. All base
+W is factored once and b rows enter the semidefinite program (`runtime.estimators.semidefinite`); the conditions are those of `runtime.model.inertia`. All base
 parameters are fitted, essential or not: a condition ties every parameter of a link. With the columns of some parameters alone, the others
 are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls. Where least squares is feasible, it is the solution.
 
@@ -37,9 +37,9 @@ from runtime.estimators.block_covariance import block_of_rows, default_block
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
 from runtime.estimators.linear import System, assemble
-from runtime.estimators.physical import PhysicalModel, physical_model
 from runtime.estimators.semidefinite import Distance, Found, Rows, closest, everything
 from runtime.model.generated import GeneratedModel
+from runtime.model.inertia import PhysicalModel, physical_model
 from runtime.observation.observation import Observation
 from runtime.observation.qr_factor import Array, Factor, factor
 from runtime.settings.schema import structure

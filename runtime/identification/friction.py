@@ -28,7 +28,6 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.estimators.block_covariance import block_of_rows, default_block
 from runtime.estimators.estimate import Estimate, aligned
-from runtime.estimators.physical import physical_model
 from runtime.identification.friction_laws import (
     LAWS,
     Terms,
@@ -42,6 +41,7 @@ from runtime.identification.friction_laws import (
     percent,
 )
 from runtime.model.generated import GeneratedModel, require
+from runtime.model.inertia import physical_model
 from runtime.observation.filters import decimated, filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states
 from runtime.observation.rows import select_rows

@@ -11,17 +11,20 @@ import pytest
 from scipy.optimize import minimize
 
 from oracles.pinocchio_model import PinocchioModel
-from runtime import InputError, SettingsError, observe, read_records, study_from_mapping
+from runtime import InputError, observe
+from runtime.errors import SettingsError
 from runtime.estimators import estimate
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import Ellipsoid, Limits, feasibility, limit_rows, standard_parameters
 from runtime.estimators.feasible import Options, linear, residual_norm, weighed
-from runtime.estimators.physical import INERTIAL, negative_elements, physical_model, pseudo_inertia
+from runtime.estimators.physical import negative_elements
 from runtime.identification.validation import split_validation
 from runtime.model.generated import load_model
+from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.observation.observation import Observation
 from runtime.records.datasets import dataset_study
-from runtime.settings.study import EstimateSettings
+from runtime.records.reading import read_records
+from runtime.settings.study import EstimateSettings, study_from_mapping
 from symgen.description import load_robot
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
