@@ -34,18 +34,22 @@ import numpy as np
 import scipy
 from rounds import interleave, processor, ratio
 
-from runtime import GeneratedModel, Record, Study, filtered_states, load_model, read_records, study_from_mapping
+from runtime import Record, Study, load_model
 from runtime.estimators.essential import essential
 from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.model.compiled import compiled_model
 from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel
+from runtime.observation.filters import filtered_states
 from runtime.observation.observation import decimated_torque, observe, select_rows
 from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
 from runtime.resolution.c import cestac_run as fused_cestac
 from runtime.resolution.c import kernels as fused
 from runtime.resolution.cestac import cestac, levels_of
 from runtime.resolution.rounding import bits, stream
 from runtime.resolution.run import Part, Task, one_run, perturbed_position
+from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

@@ -36,11 +36,12 @@ import numpy as np
 import scipy
 from c_speed import interleave, processor, ratio
 
-from runtime import GeneratedModel, load_model
+from runtime import load_model
 from runtime.estimators.reductions import normal_equations, triangular_factor
 from runtime.estimators.solution import solve
 from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.model.compiled import CompiledModel, compiled_model
+from runtime.model.generated import GeneratedModel
 from runtime.resolution.c import least_squares as in_c
 from symgen.description import load_robot
 from symgen.emit import generate_files

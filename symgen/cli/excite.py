@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from runtime.result_files import reserved
 from symgen.cli.session import opened_model, progress_bar, reported_errors, single_thread, symbolic_file, yaml_text
-from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.excitation.criteria import Limits, Weights

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from runtime.result_files import reserved, write_all
 from symgen.cli.session import NEGATIVE, reported_errors, single_thread
-from symgen.cli.writing import reserved, write_all
 
 if TYPE_CHECKING:
     from symgen.cli.fleet_jobs import Done, Job, Row

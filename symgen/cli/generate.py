@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
+from runtime.result_files import write_all
 from symgen.cli.doubts import tell_doubts
 from symgen.cli.session import NEGATIVE, fail, reported_errors
-from symgen.cli.writing import write_all
 
 TARGETS = {"numpy": "{}.py", "casadi": "{}_casadi.py", "c": "{}.c", "xp": "{}_xp.py"}
 

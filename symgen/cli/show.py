@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from runtime.result_files import write_all
 from symgen.cli.doubts import tell_doubts
 from symgen.cli.session import fail, reported_errors
-from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
     from rich.text import Text

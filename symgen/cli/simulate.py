@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from runtime.result_files import reserved
 from symgen.cli.session import SIMULATED, fail, opened_model, reported_errors, single_thread, study_text, symbolic_file
-from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     import numpy as np

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from runtime.result_files import write_all
 from symgen.cli.generate import emitted
 from symgen.cli.main import app
-from symgen.cli.writing import write_all
 from symgen.description import packaged_robots, skeleton
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"

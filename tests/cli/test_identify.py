@@ -10,10 +10,10 @@ import typer
 from typer.testing import CliRunner
 
 from runtime.estimators.estimate import Estimate
+from runtime.result_files import write_all
 from runtime.settings.files import load_study
 from symgen.cli.identify import identify
 from symgen.cli.main import app
-from symgen.cli.writing import write_all
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 FILES = {"report.html", "estimate.json", "estimate.mat", "estimate.npz", "parameters.csv", "parameters.tex"}

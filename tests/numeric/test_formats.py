@@ -15,9 +15,11 @@ import pytest
 import scipy.io
 from bag_files import joint_states, write_bag
 
-from runtime import load_model, observe, read_records, study_from_mapping
+from runtime import load_model, observe
 from runtime.estimators.essential import essential
 from runtime.records.datasets import dataset_study, fetch
+from runtime.records.reading import read_records
+from runtime.settings.study import study_from_mapping
 
 FORMATS = ("csv", "csv.gz", "parquet", "mat 5", "mat 7", "mat 7.3", "npz", "npy", "ros1", "sqlite3", "mcap", "bare mcap")
 JOINTS = [f"joint_{j}" for j in range(1, 7)]

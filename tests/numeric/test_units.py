@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runtime import Drives, read_record, study_from_mapping
+from runtime import read_record
 from runtime.errors import InputError, SettingsError
+from runtime.model.drives import Drives
+from runtime.settings.study import study_from_mapping
 from runtime.settings.units import GRAMMAR, SI, TABLE, position_unit, speed, time_unit, torque_unit
 
 OURS = {"counts", "count", "°", "Nm", "mNm", "rev"}
