@@ -42,7 +42,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "h5py": ("runtime/records/formats/mat.py",),
     "rosbags": ("runtime/records/formats/bags.py",),
     "cvxpy": ("runtime/estimators/semidefinite.py",),
-    "array_api_compat": ("runtime/resolution/device.py", "generated/"),
+    "array_api_compat": ("generated/",),
     "dask": ("runtime/distributed.py",),
     "distributed": ("runtime/distributed.py",),
     "threadpoolctl": ("runtime/distributed.py",),

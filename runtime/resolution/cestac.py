@@ -39,7 +39,6 @@ from runtime.parallel import results
 from runtime.records.record import Record
 from runtime.resolution.c import cestac_run as fused_cestac
 from runtime.resolution.checkpoint import Checkpoint
-from runtime.resolution.device import Device
 from runtime.resolution.result import Cestac, Level, level_result
 from runtime.resolution.run import Part, Task, forget, observed, run_block
 from runtime.resolution.runs import Runs
@@ -63,7 +62,6 @@ def cestac(
     constants: Mapping[str, float] | None = None,
     workers: int = 0,
     scheduler: str | None = None,
-    device: Device | None = None,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     provenance: Mapping[str, Any] | None = None,
@@ -79,7 +77,6 @@ def cestac(
     workers : processes, 0 for this one (`runtime.parallel`); the results do not depend on it. A script that asks for processes needs the usual
         `if __name__ == "__main__"`.
     scheduler : address of a Dask cluster that works instead (`runtime.distributed`), with the same results.
-    device : arrays that work instead, in this process (`runtime.resolution.device`), with the same results to rounding.
     progress : called with the number of runs done and their total.
     checkpoint : where runs are kept while the study lasts; those of an interrupted or shorter study with the same settings are not repeated.
     """
@@ -90,8 +87,6 @@ def cestac(
         raise SettingsError(
             f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("cestac", "side")
         )
-    if device is not None and (workers or scheduler):
-        raise InputError("a device works in this process; leave out workers and scheduler")
     if scheduler and workers:
         raise InputError("a scheduler has workers of its own; leave out workers")
     names = _columns(model, records, study, columns, constants)
@@ -113,11 +108,11 @@ def cestac(
         "estimate": to_mapping(study.estimate),
         "cestac": to_mapping(settings),
         "rate": [record.rate for record in records],
-        "target": device.name if device else target_of(model),
+        "target": target_of(model),
         "torque_side": "joint" if drives is None else "motor",
     }
     finished = checkpoint.resume(_identity(task, described, reference.provenance), len(names)) if checkpoint else Runs.of((), len(names))
-    runs = _all_runs(task, finished, partial(_results, task, workers, scheduler, device), progress, checkpoint)
+    runs = _all_runs(task, finished, partial(_results, task, workers, scheduler), progress, checkpoint)
     return Cestac(
         names=names,
         reference=reference,
@@ -175,10 +170,8 @@ def _all_runs(
     return Runs.joined(parts, b)
 
 
-def _results(task: Task, workers: int, scheduler: str | None, device: Device | None, blocks: Sequence[tuple[Key, ...]]) -> Iterator[Runs]:
-    """Blocks of runs, from this process, several, a cluster or a device."""
-    if device is not None:
-        return device(task, blocks)
+def _results(task: Task, workers: int, scheduler: str | None, blocks: Sequence[tuple[Key, ...]]) -> Iterator[Runs]:
+    """Blocks of runs, from this process, several, or a cluster."""
     in_c = isinstance(task.model, CompiledModel)
     run = fused_cestac.run_block if in_c else run_block
     if not blocks or not (workers or scheduler):

@@ -28,11 +28,12 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from runtime.estimators.estimate import Estimate, aligned, json_text
+from runtime.estimators.estimate import Estimate, json_text
 from runtime.latex import error_table, level_table
+from runtime.markup import Markup, number
 from runtime.observation.observation import Observation
-from runtime.reporting.notebook import cestac_html
 from runtime.resolution.runs import Runs
+from runtime.table import Table, aligned, notebook
 
 Array = np.ndarray
 
@@ -156,7 +157,15 @@ class Cestac:
         return aligned(lines)
 
     def _repr_html_(self) -> str:
-        return cestac_html(self)
+        labels = [r.level.label for r in self.levels]
+        rows = [
+            (name, number(self.reference.X[i]), *(f"{number(r.mean[i])} ({number(r.e[i], '.2f')} %)" for r in self.levels))
+            for i, name in enumerate(self.names)
+        ]
+        rows.append((Markup("%e(ρ)"), "", *(f"{number(r.e_rho, '.2f')} %" for r in self.levels)))
+        rows.append((Markup("verdict"), "", *(r.verdict for r in self.levels)))
+        table = Table("Resolution study", ("parameter", "least squares", *labels), rows, symbols=True)
+        return notebook([f"Resolution study: mean of the runs and, in brackets, %e (21); {self.verdict}"], table)
 
     def _repr_latex_(self) -> str:
         return self.to_latex()
