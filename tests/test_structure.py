@@ -51,8 +51,6 @@ ONLY_IN = {  # library: files and folders that may import it
 LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be mended, then empty
     "runtime.observation.by_blocks": {"runtime.estimators", "runtime.estimators.block_covariance"},
     "runtime.settings.files": {"runtime.records.datasets", "runtime.records.formats.table"},
-    "runtime.resolution.result": {"runtime.reporting.notebook"},
-    "runtime.estimators.estimate": {"runtime.reporting.notebook"},
     "symgen.regroup.regrouping": {"symgen.report.notebook"},
     "symgen.demo.demonstration": {"symgen.cli.session"},
     "symgen.demo.haptic": {f"symgen.cli.{name}" for name in ("session", "writing", "identify", "pages", "resolution_files")},

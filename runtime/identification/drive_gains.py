@@ -28,7 +28,6 @@ from scipy.optimize import nnls
 
 from runtime.errors import InputError
 from runtime.estimators.block_covariance import block_of_rows, default_block
-from runtime.estimators.estimate import aligned
 from runtime.estimators.linear import assemble
 from runtime.estimators.ols import system
 from runtime.identification.payload import carried
@@ -41,6 +40,7 @@ from runtime.observation.qr_factor import triangularise
 from runtime.observation.rows import select_rows
 from runtime.records.record import Record
 from runtime.settings.study import EstimateSettings, PayloadSettings, Study
+from runtime.table import aligned
 
 Array = np.ndarray
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.estimators.block_covariance import block_of_rows, default_block
-from runtime.estimators.estimate import Estimate, aligned
+from runtime.estimators.estimate import Estimate
 from runtime.identification.friction_laws import (
     LAWS,
     Terms,
@@ -47,6 +47,7 @@ from runtime.observation.observation import decimated_torque, observation_from_s
 from runtime.observation.rows import select_rows
 from runtime.records.record import Record
 from runtime.settings.study import Study
+from runtime.table import aligned
 
 Array = np.ndarray
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from runtime.estimators.estimate import Estimate, aligned, json_text
+from runtime.estimators.estimate import Estimate, json_text
 from runtime.resolution.result import CONFIDENCE, DECIDING, Level, deciding_names
+from runtime.table import aligned
 
 Array = np.ndarray
 

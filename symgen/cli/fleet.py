@@ -74,7 +74,7 @@ def finished(jobs: Sequence[Job], output: Path | None, workers: int, scheduler: 
 
 def summary_text(rows: Sequence[Row]) -> str:
     """The table, then what failed and why."""
-    from runtime.estimators.estimate import aligned
+    from runtime.table import aligned
     from symgen.cli.fleet_jobs import shortened
 
     def number(value: float | None, form: str) -> str:

@@ -49,7 +49,7 @@ def test_estimate_is_a_table():
     shown = fit()._repr_html_()
     ElementTree.fromstring(shown)
     page = Elements(shown)
-    assert "<span>ZZ<sub>1R</sub></span>" in shown and "kg m²" in page.text and "10.00" in page.text and "error 2.50 %" in page.text
+    assert "<var>ZZ<sub>1R</sub></var>" in shown and "kg\xa0m²" in page.text and "10.000" in page.text and "relative error 2.500 %" in page.text
     assert {tag for tag, _ in page.tags} <= {
         "div",
         "p",
@@ -60,7 +60,7 @@ def test_estimate_is_a_table():
         "tr",
         "th",
         "td",
-        "span",
+        "var",
         "sub",
         "details",
         "summary",
@@ -110,7 +110,7 @@ def test_a_notebook_shows_them():
     book = nbformat.v4.new_notebook()
     book.cells = [
         nbformat.v4.new_code_cell("import symgen\nsymgen.regroup(symgen.load_robot('planar_2r'))"),
-        nbformat.v4.new_code_cell("from runtime.reporting.notebook import symbol\nprint(symbol('ZZ1R'))"),
+        nbformat.v4.new_code_cell("from runtime.markup import symbol\nprint(symbol('ZZ1R'))"),
     ]
     NotebookClient(book, timeout=120, kernel_name="python3").execute()
     data = book.cells[0].outputs[0]["data"]
