@@ -64,7 +64,7 @@ def excite(
         from runtime.excitation.search import excite as search
         from runtime.records.reading import read_records
         from runtime.settings.excitation import ExcitationSettings
-        from runtime.settings.files import study_of
+        from runtime.records.named import study_of
         from runtime.settings.schema import structure
         from runtime.settings.study import Study, to_mapping
 

@@ -40,7 +40,7 @@ def simulate(
         from runtime.motion.reference import reference_of
         from runtime.motion.simulation import Simulator, parameters_of
         from runtime.records.reading import read_records
-        from runtime.settings.files import study_of
+        from runtime.records.named import study_of
 
         settings, folder = study_of(study)
         controller = settings.controller
