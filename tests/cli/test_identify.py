@@ -6,6 +6,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from campaign import campaign
 import typer
 from typer.testing import CliRunner
 
@@ -196,6 +197,7 @@ def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
     assert run("emps", tmp_path / "study.yaml", "--block", "3").exit_code == 2
 
 
+@campaign
 def test_report_says_what_its_figures_leave_out(tx40_data, tmp_path, monkeypatch):
     monkeypatch.setattr("runtime.observation.by_blocks.SHOWN", 300)
     assert run("tx40", "tx40", "--block", 20000, "-o", tmp_path).exit_code == 0

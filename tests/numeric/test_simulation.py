@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import campaign
 from scipy.integrate import solve_ivp
 
 from runtime import InputError, load_model
@@ -116,6 +117,7 @@ def test_against_scipy(tx40, truth):
     assert np.abs(found.q[-1] - rest[0]).max() > 1e-2  # it moved
 
 
+@campaign
 def test_against_cvodes_and_substeps(tx40, truth):
     """The same loop by CVODES and by more substeps: the flow between two ticks is exact to 1e-7."""
     settings = controller()
