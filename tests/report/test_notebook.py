@@ -12,8 +12,7 @@ from nbclient import NotebookClient
 
 from runtime.estimators.estimate import Estimate, JointFit
 from runtime.observation.observation import Observation
-from runtime.resolution.result import Cestac, Level, level_result
-from runtime.resolution.runs import Run, Runs
+from runtime.resolution.result import Cestac, Level, Run, Runs, level_result
 from symgen.description import load_robot
 from symgen.regroup.regrouping import regroup
 
@@ -109,7 +108,7 @@ def test_a_notebook_shows_them():
     """Run in a kernel: both results come as HTML and LaTeX beside the text."""
     book = nbformat.v4.new_notebook()
     book.cells = [
-        nbformat.v4.new_code_cell("import symgen\nsymgen.regroup(symgen.load_robot('planar_2r'))"),
+        nbformat.v4.new_code_cell("import symgen\nsymgen.regrouping(symgen.load_robot('planar_2r'))"),
         nbformat.v4.new_code_cell("from runtime.markup import symbol\nprint(symbol('ZZ1R'))"),
     ]
     NotebookClient(book, timeout=120, kernel_name="python3").execute()
