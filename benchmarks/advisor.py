@@ -13,6 +13,7 @@ parameter that matters below 30 % of the limit at the step where it reaches it, 
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -32,9 +33,9 @@ from runtime.observation.position_errors import perturbation  # noqa: E402
 from runtime.records.datasets import dataset_study  # noqa: E402
 from runtime.records.reading import read_records  # noqa: E402
 from runtime.resolution.advice import crossing  # noqa: E402
-from runtime.resolution.advisor import LIMITS, advise  # noqa: E402
+from runtime.resolution.advisor import LIMITS, advise, sampled_level  # noqa: E402
 from runtime.resolution.cestac import cestac  # noqa: E402
-from runtime.resolution.sampler import Sampler  # noqa: E402
+from runtime.resolution.perturbed import Task, prepared  # noqa: E402
 from runtime.settings.study import study_from_mapping  # noqa: E402
 from symgen.demo.haptic_record import haptic_record, haptic_study  # noqa: E402
 
@@ -61,10 +62,11 @@ def steps_table(name, model, study, record, names):
     first = advice.encoders[0]
     part = perturbation(model, record, study, names)
     system = linear_system(part.seen, replace(study.estimate, columns="all"))
-    sampler = Sampler(model, (record,), (part,), study.cestac, study.estimate, {}, assemble(system, system.solve(), model=model))
+    task = Task((prepared(record, study),), model, tuple(names), replace(study.estimate, columns="all"), study.cestac, (), None, {})
+    level = partial(sampled_level, task, (part,), assemble(system, system.solve(), model=model))
     low, high = first.limits[0].delta / RATIO**2, first.delta[-1] / RATIO
     grid = np.geomspace(low, high, round(np.log(high / low) / np.log(RATIO)) + 1)
-    points = [sampler.level(delta, range(record.n), RUNS[name]) for delta in grid]
+    points = [level(range(record.n), delta, RUNS[name]) for delta in grid]
     e, half = np.array([np.abs(p.change) for p in points]), np.array([p.half_width for p in points])
     print(f"\n{name}: {RUNS[name]} runs at {len(grid)} steps; predicted / sampled step, and the sampled interval over the sampled step")
     within = compared = 0
@@ -81,10 +83,10 @@ def steps_table(name, model, study, record, names):
                 f"  {percent:g} %  {names[i]:8s} {predicted[i]:.3e} {sampled:.3e}  {predicted[i] / sampled:.3f}  [{least / sampled:.2f}, {most / sampled:.2f}]{mark}"
             )
     print(f"  within 15 %: {within} of {compared}")
-    return advice, sampler
+    return advice, level
 
 
-def cost(name, model, study, record, names, advice, sampler):
+def cost(name, model, study, record, names, advice, level):
     """CPU times, interleaved."""
     predicting, sampling = [], []
     limit = advice.encoders[0].limits[0]
@@ -98,7 +100,7 @@ def cost(name, model, study, record, names, advice, sampler):
         sampling.append((time.process_time() - middle) / few.cestac.runs)
     runs = {
         "five runs": len(whole.encoders) * LEVELS * 5,
-        "runs for every parameter": LEVELS / 2 * needed_runs(whole, model, record, names, sampler),
+        "runs for every parameter": LEVELS / 2 * needed_runs(whole, model, record, names, level),
     }
     one, all_of_it = median(sampling), median(predicting)
     print(
@@ -110,7 +112,7 @@ def cost(name, model, study, record, names, advice, sampler):
         )
 
 
-def needed_runs(whole, model, record, names, sampler):
+def needed_runs(whole, model, record, names, level):
     """Runs at one step, summed over choices of encoders and limits."""
     total = 0
     for encoder in whole.encoders:
@@ -118,7 +120,7 @@ def needed_runs(whole, model, record, names, sampler):
         for limit in encoder.limits:
             needed = 5
             if np.isfinite(limit.delta):
-                point = sampler.level(limit.delta, chosen, 10)
+                point = level(chosen, limit.delta, 10)
                 reached = encoder.reached(limit.percent)
                 for i in (names.index(n) for n in whole.deciding if np.isfinite(reached[names.index(n)])):
                     spread = point.half_width[i] * np.sqrt(10) / stdtrit(9, 0.975) * reached[i] / limit.delta
@@ -133,8 +135,8 @@ def main():
         with opened_model(name) as model, TemporaryDirectory() as folder:
             study, record = opened(name, model, Path(folder))
             found = essential(observe(model, record, study), study.essential, study.estimate)
-            advice, sampler = steps_table(name, model, study, record, found.names)
-            cost(name, model, study, record, found.names, advice, sampler)
+            advice, level = steps_table(name, model, study, record, found.names)
+            cost(name, model, study, record, found.names, advice, level)
 
 
 if __name__ == "__main__":

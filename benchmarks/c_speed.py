@@ -22,9 +22,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from rounds import interleave, processor, ratio
 
-from runtime import GeneratedModel, load_model
+from runtime import load_model
 from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.model.compiled import compiled_model
+from runtime.model.generated import GeneratedModel
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

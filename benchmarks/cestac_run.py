@@ -34,18 +34,24 @@ import numpy as np
 import scipy
 from rounds import interleave, processor, ratio
 
-from runtime import GeneratedModel, Record, Study, filtered_states, load_model, read_records, study_from_mapping
+from runtime import Record, Study, load_model
 from runtime.estimators.essential import essential
 from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.model.compiled import compiled_model
 from runtime.model.drives import Drives
-from runtime.observation.observation import decimated_torque, observe, select_rows
+from runtime.model.generated import GeneratedModel
+from runtime.observation.filters import filtered_states
+from runtime.observation.observation import observe
 from runtime.records.datasets import dataset_study
-from runtime.resolution.c import cestac_run as fused_cestac
-from runtime.resolution.c import kernels as fused
+from runtime.records.reading import read_records
+from runtime.resolution.c import kernels
+from runtime.resolution.c.least_squares import KeptRows, least_squares
+from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.cestac import cestac, levels_of
+from runtime.resolution.perturbed import Task, perturbed_position, prepared
 from runtime.resolution.rounding import bits, stream
-from runtime.resolution.run import Part, Task, one_run, perturbed_position
+from runtime.resolution.run import NumpyWorkspace
+from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit import generate_files
 
@@ -55,16 +61,14 @@ ROBOT, KEY = "tx40", (0, 0)
 
 def task_of(model: GeneratedModel, record: Record, study: Study, names: tuple[str, ...]) -> Task:
     """What every run of the study needs."""
-    signals = replace(study.signals, median=1)
-    selection = select_rows(record, filtered_states(record.q, record.rate, signals).qd, signals, study.rows)
-    part = Part(record.q, record.tau, record.rate, {}, selection, decimated_torque(record.tau, selection))
+    study = replace(study, cestac=replace(study.cestac, median=1))
     drives = Drives.from_mapping(model.DRIVES) if model.DRIVES else None
-    return Task((part,), model, names, replace(study.estimate, columns="all"), study.cestac, levels_of(study.cestac), drives, {})
+    return Task((prepared(record, study),), model, names, replace(study.estimate, columns="all"), study.cestac, levels_of(study.cestac), drives, {})
 
 
 def plain_run(task: Task, key: tuple[int, int]) -> Array:
     """The same estimate as anyone would write it."""
-    (part,), n = task.parts, len(task.model.JOINTS)
+    (part,), n = task.records, len(task.model.JOINTS)
     chosen = part.selection
     q = perturbed_position(part.q, task.levels[key[0]], task.settings, task.drives, key)
     states = filtered_states(q, part.rate, chosen.signals)[chosen.samples]
@@ -78,19 +82,20 @@ def plain_run(task: Task, key: tuple[int, int]) -> Array:
 
 def measure(title: str, module: GeneratedModel, record: Record, study: Study, names: tuple[str, ...], rounds: int) -> None:
     task, in_c = task_of(module, record, study, names), task_of(compiled_model(module), record, study, names)
-    part = task.parts[0]
+    part = task.records[0]
+    numpy, compiled = NumpyWorkspace(task, module), CompiledWorkspace(in_c, in_c.model)
     N, K = part.selection.samples.stop - part.selection.samples.start, len(part.selection.kept)
     print(f"\n{title}: {len(record.q)} samples, {N} of them used, {K} kept, {len(names)} columns")
     X = plain_run(task, KEY)
-    for label, found in (("NumPy", one_run(task, KEY).X), ("C", fused_cestac.run_block(in_c, [KEY]).X[0])):
+    for label, found in (("NumPy", numpy.fit(task.levels[0], KEY).X), ("C", compiled.fit(task.levels[0], KEY).X)):
         print(
             f"    {label:6} largest difference from plain {np.abs(np.array(found) - X).max() / np.abs(X).max():.1e} of the largest parameter"
         )
     contenders: dict[str, Callable[[], object]] = {
         "plain": lambda: plain_run(task, KEY),
-        "NumPy": lambda: one_run(task, KEY),
-        "C": lambda: fused_cestac.run_block(in_c, [KEY]),
-        **stages(in_c),
+        "NumPy": lambda: numpy.fit(task.levels[0], KEY),
+        "C": lambda: compiled.fit(task.levels[0], KEY),
+        **stages(in_c, compiled),
     }
     times = interleave(contenders, rounds)
     for name, row in times.items():
@@ -99,23 +104,22 @@ def measure(title: str, module: GeneratedModel, record: Record, study: Study, na
         print(f"    plain / {below:16} {ratio(times, 'plain', below)}   goal {goal}")
 
 
-def stages(task: Task) -> dict[str, Callable[[], object]]:
+def stages(task: Task, work: CompiledWorkspace) -> dict[str, Callable[[], object]]:
     """The stages of a run in C, each on the arrays of the one before."""
-    work = fused_cestac.FusedWorkspace(task)
-    (part, q, room), chosen = work.parts[0], task.parts[0].selection
-    states = fused.FilteredStates(q, part.rate, chosen.signals, room)
+    (part, q, room), chosen = work.records[0], task.records[0].selection
+    states = kernels.FilteredStates(q, part.rate, chosen.signals, room)
     arguments = chosen.samples, chosen.factor, chosen.signals.decimate, work.constants, room
-    y = fused.decimated(work.entries, states, *arguments)
-    rows = fused_cestac.KeptRows(work.entries, [(y, part.torque, chosen.mask)], work.room)
+    y = kernels.decimated(work.entries, states, *arguments)
+    rows = KeptRows(work.entries, [(y, part.torque, chosen.mask)], work.room)
 
-    def draw_and_filter() -> fused.FilteredStates:
+    def draw_and_filter() -> kernels.FilteredStates:
         up = bits(q.shape, stream(task.settings.seed, *KEY))
-        return fused.FilteredStates(q, part.rate, chosen.signals, room, up=up, step=task.levels[0].delta)
+        return kernels.FilteredStates(q, part.rate, chosen.signals, room, up=up, step=task.levels[0].delta)
 
     return {
         "  C: draw, filters": draw_and_filter,
-        "  C: signals, decimation": lambda: fused.decimated(work.entries, states, *arguments),
-        "  C: least squares": lambda: fused_cestac.least_squares(rows),
+        "  C: signals, decimation": lambda: kernels.decimated(work.entries, states, *arguments),
+        "  C: least squares": lambda: least_squares(rows),
     }
 
 

@@ -31,11 +31,14 @@ import distributed
 import numpy as np
 from c_speed import processor
 
-from runtime import GeneratedModel, Record, Study, load_model, observe, read_records, study_from_mapping
+from runtime import Record, Study, load_model, observe
 from runtime.estimators.essential import essential
 from runtime.model.compiled import compiled_model
+from runtime.model.generated import GeneratedModel
 from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
 from runtime.resolution.cestac import Cestac, cestac
+from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit import generate_files
 

@@ -30,10 +30,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from simulation import LAW
 
-from runtime import InputError, load_model, read_records, study_from_mapping
+from runtime import InputError, load_model
 from runtime.estimators import estimate
 from runtime.estimators.closed_loop import ClosedLoop, closed_loop
-from runtime.estimators.estimate import Estimate, aligned
+from runtime.estimators.estimate import Estimate
 from runtime.model.generated import GeneratedModel
 from runtime.motion.reference import Reference, reference_of
 from runtime.motion.simulation import Simulator, parameters_of
@@ -41,8 +41,10 @@ from runtime.observation.observation import Observation
 from runtime.observation.position_errors import with_errors
 from runtime.parallel import results
 from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
 from runtime.records.record import Record
-from runtime.settings.study import EstimateSettings, Study
+from runtime.settings.study import EstimateSettings, Study, study_from_mapping
+from runtime.table import aligned
 
 Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"

@@ -23,18 +23,20 @@ import numpy as np
 from scipy.io import loadmat
 from simulation import LAW
 
-from runtime import load_model, read_records, study_from_mapping
+from runtime import load_model
 from runtime.errors import InputError
 from runtime.estimators import estimate
 from runtime.estimators.closed_loop import closed_loop
-from runtime.estimators.estimate import Estimate, aligned
+from runtime.estimators.estimate import Estimate
 from runtime.model.generated import GeneratedModel
 from runtime.motion.reference import Reference
 from runtime.motion.simulation import Simulator
 from runtime.observation.observation import Observation
 from runtime.observation.position_errors import with_errors
 from runtime.records.datasets import dataset_study, fetch
-from runtime.settings.study import EstimateSettings, Study
+from runtime.records.reading import read_records
+from runtime.settings.study import EstimateSettings, Study, study_from_mapping
+from runtime.table import aligned
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 ENCODER = {"emps": 1e-6, "tx40": 1e-5}  # deviation of a position that TLS is told, m and rad of the joint

@@ -32,7 +32,7 @@ from runtime.observation.observation import observe
 from runtime.records.reading import read_records
 from runtime.settings.controller import Controller
 from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.files import study_of
+from runtime.records.named import study_of
 from runtime.settings.schema import structure
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"

@@ -32,8 +32,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from runtime import load_model
+from runtime.result_files import FINISHED, LOCK, UNFINISHED
 from symgen import load_robot
-from symgen.cli.writing import FINISHED, LOCK, UNFINISHED
 from symgen.emit import generate_module
 
 MAIN = "from symgen.cli.main import main; main()"

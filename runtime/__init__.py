@@ -1,52 +1,91 @@
-"""From a measured record to parameters: numpy and scipy only.
+"""From a measured record to parameters, and how far to trust them.
 
-    model = load_model("tx40")
-    study = load_study(path)                        # runtime.settings.files
-    record = read_records(study.record, model)[0]
-    observation = observe(model, record, study)     # Y = W X + rho, eqs. (6) and (14)
+    model = runtime.load_model("tx40")              # an emitted module: by name, by path, or the module itself
+    record = runtime.Record(t, q, tau)              # joint side, SI, shapes (N,), (N, n), (N, n)
+    result = runtime.identify(model, record)        # every function: model, record or records, study
+    result.estimate, result.checklist
+    runtime.report(result, "out")                   # the page and the files of `symgen identify -o`
 
-    streams = open_streams(study.record, model, block=65536)
-    reduction = reduce_records(model, streams, study)       # the same for records larger than memory: factors instead of rows
-
-Estimators take an Observation or a Reduction and return an Estimate (`runtime.estimators`). On states without filters,
-`normal_equations` and `triangular_factor` solve by blocks, without W.
+Names are loaded when they are first used, so that `import runtime` is light. NumPy and SciPy serve every function but `simulate`, `excite` and
+the estimators that simulate the closed loop (CasADi), the estimator of feasible parameters (Clarabel) and `report` (Matplotlib, Jinja2).
 """
 
-from runtime.errors import DataUnavailableError, InputError, ModelError, SettingsError
-from runtime.estimators.reductions import normal_equations, triangular_factor
-from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, load_model
-from runtime.observation.by_blocks import reduce_records
-from runtime.observation.filters import States, filtered_states
-from runtime.observation.observation import Observation, observe, stack
-from runtime.observation.reduction import Reduction
-from runtime.records.reading import read_record, read_records
-from runtime.records.reading_by_blocks import open_streams
-from runtime.records.record import Record
-from runtime.settings.study import Study, study_from_mapping, to_mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from runtime.errors import InputError
+    from runtime.estimators import estimate
+    from runtime.estimators.essential import essential
+    from runtime.estimators.estimate import Estimate
+    from runtime.excitation.search import excite
+    from runtime.identification.identification import Identification, identify
+    from runtime.model.generated import load_model
+    from runtime.motion.simulation import simulate
+    from runtime.observation.observation import Observation, observe
+    from runtime.records.reading import read_record
+    from runtime.records.record import Record
+    from runtime.reporting.files import report
+    from runtime.resolution.advice import Advice
+    from runtime.resolution.advisor import advise
+    from runtime.resolution.cestac import cestac
+    from runtime.resolution.result import Cestac
+    from runtime.settings.files import load_study
+    from runtime.settings.study import Study
 
 __all__ = [
-    "DataUnavailableError",
-    "Drives",
-    "GeneratedModel",
+    "Advice",
+    "Cestac",
+    "Estimate",
+    "Identification",
     "InputError",
-    "ModelError",
     "Observation",
     "Record",
-    "Reduction",
-    "SettingsError",
-    "States",
     "Study",
-    "filtered_states",
+    "advise",
+    "cestac",
+    "essential",
+    "estimate",
+    "excite",
+    "identify",
     "load_model",
-    "normal_equations",
+    "load_study",
     "observe",
-    "open_streams",
     "read_record",
-    "read_records",
-    "reduce_records",
-    "stack",
-    "study_from_mapping",
-    "to_mapping",
-    "triangular_factor",
+    "report",
+    "simulate",
 ]
+
+_MODULES = {
+    "runtime.errors": ("InputError",),
+    "runtime.estimators": ("estimate",),
+    "runtime.estimators.essential": ("essential",),
+    "runtime.estimators.estimate": ("Estimate",),
+    "runtime.excitation.search": ("excite",),
+    "runtime.identification.identification": ("Identification", "identify"),
+    "runtime.model.generated": ("load_model",),
+    "runtime.motion.simulation": ("simulate",),
+    "runtime.observation.observation": ("Observation", "observe"),
+    "runtime.records.reading": ("read_record",),
+    "runtime.records.record": ("Record",),
+    "runtime.reporting.files": ("report",),
+    "runtime.resolution.advice": ("Advice",),
+    "runtime.resolution.advisor": ("advise",),
+    "runtime.resolution.cestac": ("cestac",),
+    "runtime.resolution.result": ("Cestac",),
+    "runtime.settings.files": ("load_study",),
+    "runtime.settings.study": ("Study",),
+}
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, from the module that defines it (PEP 562)."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_MODULE_OF[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

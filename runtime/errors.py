@@ -6,11 +6,34 @@ they are a status of the Estimate.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
 LONGEST = 2000  # characters of a message: a file may hold names of any length
+
+EXPECTED = {  # by the type of an error of pydantic
+    "bool_type": "true or false",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "greater_than": "more than {gt}",
+    "greater_than_equal": "at least {ge}",
+    "int_type": "an integer",
+    "less_than": "less than {lt}",
+    "less_than_equal": "at most {le}",
+    "list_type": "a list",
+    "mapping_type": "a mapping",
+    "dict_type": "a mapping",
+    "dataclass_type": "a mapping",
+    "string_type": "a text",
+    "tuple_type": "a list",
+}
 
 
 def printable(text: str) -> str:
-    """`text` as a terminal may show it: what controls one (escape sequences, changes of direction) spelled out, the middle of a long one left out."""
+    """`text` as a terminal may show it: control characters spelled out, the middle of a long text left out."""
     for _ in range(2):  # spelled out, a text may be too long again
         if len(text) > LONGEST:
             text = f"{text[: LONGEST - 400]} ... {text[-300:]}"
@@ -20,7 +43,7 @@ def printable(text: str) -> str:
 
 
 def first_line(error: BaseException) -> str:
-    """What another library said of a file, in one line."""
+    """The first line of the message of another library's error."""
     return str(error).partition("\n")[0] or type(error).__name__
 
 
@@ -29,8 +52,14 @@ class InputError(ValueError):
 
     Parameters
     ----------
-    message : what was found, what was expected, what to do.
-    file : name of the file; column : name of the column; row : what counts rows and which, e.g. "line 12" or "sample 40".
+    message : str
+        What was given, what was expected, what to do.
+    file : str, optional
+        Name of the file.
+    column : str, optional
+        Name of the column.
+    row : str, optional
+        Place in the file, such as "line 12" or "sample 40".
     """
 
     def __init__(self, message: str, *, file: str | None = None, column: str | None = None, row: str | None = None) -> None:
@@ -40,7 +69,19 @@ class InputError(ValueError):
 
 
 class SettingsError(InputError):
-    """A study setting that is unknown, of another type or out of range; `path` holds its keys, `line` its line in the study file."""
+    """A setting that is unknown, of another type or out of range.
+
+    Parameters
+    ----------
+    message : str
+        What was given, what was expected, what to do.
+    path : tuple of str and int
+        Keys that lead to the setting.
+    file : str, optional
+        Name of the study file.
+    line : int, optional
+        Line of the setting in that file, from 1.
+    """
 
     def __init__(self, message: str, *, path: tuple[str | int, ...] = (), file: str | None = None, line: int | None = None) -> None:
         self.path, self.line, self.reason = path, line, message
@@ -53,8 +94,66 @@ class ModelError(InputError):
 
 
 class DataUnavailableError(InputError):
-    """A dataset that none of the places looked at holds; `tried` lists them with what went wrong in each."""
+    """A dataset that is neither on this machine nor at its source; `tried` lists the places and what went wrong in each."""
 
     def __init__(self, message: str, *, tried: tuple[str, ...] = ()) -> None:
         self.tried = tried
         super().__init__(message)
+
+
+def settings_error(error: ValidationError, given: Any, path: tuple[str | int, ...] = ()) -> SettingsError:
+    """The first problem of a pydantic validation as one SettingsError.
+
+    Every member of a union has its own error. The member that took most of the value knows best; members that took equally much
+    are named together.
+
+    Parameters
+    ----------
+    given : Any
+        Value that was validated.
+    path : tuple of str and int
+        Keys that lead to `given`.
+    """
+    problems = [_problem(one, given) for one in error.errors(include_url=False)]
+    first = problems[0][0]
+    alike = [(place, reason) for place, reason in problems if place[: len(first)] == first]
+    deepest = max((place for place, _ in alike), key=len)
+    reasons = list(dict.fromkeys(reason for place, reason in alike if place == deepest))
+    head, _, _ = reasons[0].partition("; expected ")
+    expected = " or ".join(reason.split("; expected ", 1)[-1] for reason in reasons)
+    return SettingsError(f"{head}; expected {expected}" if len(reasons) > 1 else reasons[0], path=(*path, *deepest))
+
+
+def shown(value: Any) -> str:
+    """The first 80 characters of a value as Python writes it."""
+    return repr(value)[:80]
+
+
+def _problem(error: Mapping[str, Any], given: Any) -> tuple[tuple[str | int, ...], str]:
+    """Path and reason of one error of pydantic; `loc` also names members of unions, which are no keys."""
+    path: list[str | int] = []
+    for key in error["loc"]:
+        try:
+            given = given[key] if isinstance(given, Mapping | Sequence) and not isinstance(given, str) else getattr(given, key)
+            path.append(key)
+        except (LookupError, TypeError, AttributeError):
+            continue
+    kind, context = error["type"], error.get("ctx", {})
+    reason = f"{shown(error['input'])}; expected {EXPECTED.get(kind, '').format(**context)}"
+    if kind == "missing":
+        reason = (
+            f"no key {error['loc'][-1]}; add it"
+            if isinstance(error["loc"][-1], str)
+            else f"{len(given)} values; expected at least {error['loc'][-1] + 1}"
+        )
+    elif kind == "too_long":
+        reason = f"{context['actual_length']} values; expected {context['max_length']}"
+    elif kind == "literal_error":
+        reason = f"{shown(error['input'])}; expected {context['expected'].replace(chr(39), '')}"
+    elif isinstance(cause := context.get("error"), SettingsError):
+        path, reason = [*path, *cause.path], cause.reason
+    elif isinstance(cause, InputError):
+        reason = cause.message
+    elif kind not in EXPECTED:
+        reason = error["msg"].removeprefix("Value error, ")
+    return tuple(path), reason

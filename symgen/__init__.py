@@ -1,9 +1,8 @@
 """From a robot file to base parameters with their formulas, and to a module that evaluates its models.
 
-    robot = load_robot("tx40")                  # packaged, or a path to a robot file
-    regrouping = regroup(robot)                 # base parameters, each with its formula
-    certify(regrouping).valid                   # exact rank and identities
-    text = generate_module(robot)               # source of the module
+    model = symgen.model("arm.urdf")                  # the module: derived, emitted, certified, imported
+    base = symgen.regrouping(symgen.load_robot("tx40"))   # base parameters, each with its formula
+    symgen.certify(base).valid                        # exact rank and identities, independent dynamics, emitted module
 
 Names are loaded when they are first used.
 """
@@ -16,8 +15,10 @@ from symgen.errors import SymgenError
 if TYPE_CHECKING:
     from symgen.description import Robot, load_robot, packaged_robots, parse_robot
     from symgen.emit import generate_module
-    from symgen.regroup.certificate import Certificate, certify
-    from symgen.regroup.regrouping import BaseParameter, Regrouping, regroup
+    from symgen.emit.certified import certify, model
+    from symgen.regroup.certificate import Certificate
+    from symgen.regroup.regrouping import BaseParameter, Regrouping
+    from symgen.regroup.regrouping import regroup as regrouping
 
 __all__ = [
     "BaseParameter",
@@ -28,20 +29,24 @@ __all__ = [
     "certify",
     "generate_module",
     "load_robot",
+    "model",
     "packaged_robots",
     "parse_robot",
-    "regroup",
+    "regrouping",
 ]
 
 _HOME = {
     **dict.fromkeys(("Robot", "load_robot", "packaged_robots", "parse_robot"), "symgen.description"),
-    **dict.fromkeys(("BaseParameter", "Regrouping", "regroup"), "symgen.regroup.regrouping"),
-    **dict.fromkeys(("Certificate", "certify"), "symgen.regroup.certificate"),
+    **dict.fromkeys(("BaseParameter", "Regrouping"), "symgen.regroup.regrouping"),
+    **dict.fromkeys(("certify", "model"), "symgen.emit.certified"),
+    "Certificate": "symgen.regroup.certificate",
     "generate_module": "symgen.emit",
 }
 
 
 def __getattr__(name: str) -> Any:
+    if name == "regrouping":
+        return import_module("symgen.regroup.regrouping").regroup
     if name not in _HOME:
         raise AttributeError(f"module 'symgen' has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)

@@ -1,6 +1,8 @@
 """Who may import whom: the table of the layout, read from the syntax trees of every module."""
 
 import ast
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -28,7 +30,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "matplotlib": ("runtime/reporting/",),
     "typer": ("symgen/cli/",),
     "rich": ("symgen/cli/",),
-    "pydantic": ("symgen/description/",),
+    "pydantic": ("symgen/description/", "runtime/errors.py", "runtime/settings/", "runtime/json_documents.py"),
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/settings/yaml.py"),
     "sympy": ("symgen/regroup/symbolic.py",),
     "mpmath": ("symgen/derive/precise.py", "symgen/regroup/general.py"),
@@ -40,7 +42,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "h5py": ("runtime/records/formats/mat.py",),
     "rosbags": ("runtime/records/formats/bags.py",),
     "cvxpy": ("runtime/estimators/semidefinite.py",),
-    "array_api_compat": ("runtime/resolution/device.py", "generated/"),
+    "array_api_compat": ("generated/",),
     "dask": ("runtime/distributed.py",),
     "distributed": ("runtime/distributed.py",),
     "threadpoolctl": ("runtime/distributed.py",),
@@ -48,10 +50,6 @@ ONLY_IN = {  # library: files and folders that may import it
 }
 LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be mended, then empty
     "runtime.observation.by_blocks": {"runtime.estimators", "runtime.estimators.block_covariance"},
-    "runtime.model.mount": {"runtime.estimators.physical"},
-    "runtime.settings.files": {"runtime.records.datasets", "runtime.records.formats.table"},
-    "runtime.resolution.result": {"runtime.reporting.notebook"},
-    "runtime.estimators.estimate": {"runtime.reporting.notebook"},
     "symgen.regroup.regrouping": {"symgen.report.notebook"},
     "symgen.demo.demonstration": {"symgen.cli.session"},
     "symgen.demo.haptic": {f"symgen.cli.{name}" for name in ("session", "writing", "identify", "pages", "resolution_files")},
@@ -67,23 +65,30 @@ def module_name(path: Path) -> str:
 
 
 MODULES = {module_name(p): p for p in FILES}
-TREES = {name: ast.parse((ROOT / p).read_text(encoding="utf-8")) for name, p in MODULES.items()}
 
 
-def type_checking(tree: ast.Module) -> set[ast.AST]:
-    """Nodes under `if TYPE_CHECKING:`, which are never run."""
-    blocks = [n for n in ast.walk(tree) if isinstance(n, ast.If) and isinstance(n.test, ast.Name) and n.test.id == "TYPE_CHECKING"]
+@cache
+def nodes(name: str) -> tuple[ast.AST, ...]:
+    """The syntax tree of a module, flat: parsed and walked once for all tests."""
+    return tuple(ast.walk(ast.parse((ROOT / MODULES[name]).read_text(encoding="utf-8"))))
+
+
+def calls(name: str) -> Iterator[ast.Call]:
+    return (n for n in nodes(name) if isinstance(n, ast.Call))
+
+
+def type_checking(name: str) -> set[ast.AST]:
+    """Nodes of a module under `if TYPE_CHECKING:`, which are never run."""
+    blocks = [n for n in nodes(name) if isinstance(n, ast.If) and isinstance(n.test, ast.Name) and n.test.id == "TYPE_CHECKING"]
     return {node for block in blocks for statement in block.body for node in ast.walk(statement)}
 
 
-def imports(name: str, *, at_run_time: bool = False, at_start: bool = False) -> set[str]:
-    """Modules that `name` imports, `from package import module` resolved; `at_start`: when it is loaded, not inside a function."""
-    tree = TREES[name]
-    skipped = type_checking(tree) if at_run_time or at_start else set()
-    if at_start:
-        skipped |= {n for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) for n in ast.walk(f)}
+@cache
+def imports(name: str, *, at_run_time: bool = False) -> set[str]:
+    """Modules that `name` imports, inside functions too, `from package import module` resolved; `at_run_time`: without those for annotations."""
+    skipped = type_checking(name) if at_run_time else set()
     found: set[str] = set()
-    for node in ast.walk(tree):
+    for node in nodes(name):
         if node in skipped:
             continue
         if isinstance(node, ast.Import):
@@ -104,12 +109,14 @@ def room(module: str) -> int:
     return ROOMS[package].index(first) + 1 if first in ROOMS[package] else 0
 
 
-@pytest.mark.parametrize("name", [n for n in MODULES if n.partition(".")[0] in ROOMS])
-def test_a_room_imports_only_rooms_before_it(name: str) -> None:
+@pytest.mark.parametrize("package", ROOMS)
+def test_a_room_imports_only_rooms_before_it(package: str) -> None:
     """At load time, inside functions and for annotations alike."""
-    package = name.partition(".")[0]
-    later = {m for m in imports(name) if m.partition(".")[0] == package and room(m) > room(name)}
-    assert later - LAZY.get(name, set()) == set()
+    wrong = {}
+    for name in (n for n in MODULES if n.partition(".")[0] == package):
+        later = {m for m in imports(name) if m.partition(".")[0] == package and room(m) > room(name)}
+        wrong[name] = later - LAZY.get(name, set())
+    assert {name: later for name, later in wrong.items() if later} == {}
 
 
 @pytest.mark.parametrize("package", ROOMS)
@@ -127,10 +134,10 @@ def test_only_the_command_line_imports_both_halves() -> None:
             assert not tops & {"runtime", "generated"}, name
 
 
-@pytest.mark.parametrize("name", [n for n in MODULES if n.startswith("generated.")])
-def test_emitted_modules_import_one_array_package(name: str) -> None:
-    package = {"casadi": "casadi", "xp": "array_api_compat"}.get(name.rpartition("_")[2], "numpy")
-    assert imports(name) == {package}
+def test_emitted_modules_import_one_array_package() -> None:
+    for name in (n for n in MODULES if n.startswith("generated.")):
+        package = {"casadi": "casadi", "xp": "array_api_compat"}.get(name.rpartition("_")[2], "numpy")
+        assert imports(name) == {package}, name
 
 
 @pytest.mark.parametrize("library", ONLY_IN)
@@ -159,23 +166,21 @@ def test_files_are_of_a_readable_length() -> None:
     assert {p.as_posix(): n for p in FILES if p.parts[0] != "generated" and (n := len((ROOT / p).read_text(encoding="utf-8").splitlines())) > 400} == {}
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_nothing_runs_text_as_code(name: str) -> None:
-    called = {n.func.id if isinstance(n.func, ast.Name) else n.func.attr for n in ast.walk(TREES[name])
-              if isinstance(n, ast.Call) and isinstance(n.func, ast.Name | ast.Attribute)}  # fmt: skip
-    builtins = {n.func.id for n in ast.walk(TREES[name]) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)}
-    assert not builtins & FORBIDDEN_CALLS and not called & {"sympify", "parse_expr"}
-    assert not {m.split(".")[0] for m in imports(name)} & {"pickle", "marshal", "shelve", "dill", "cloudpickle"}
+def test_nothing_runs_text_as_code() -> None:
+    for name in MODULES:
+        called = {n.func.id if isinstance(n.func, ast.Name) else n.func.attr for n in calls(name) if isinstance(n.func, ast.Name | ast.Attribute)}
+        builtins = {n.func.id for n in calls(name) if isinstance(n.func, ast.Name)}
+        assert not builtins & FORBIDDEN_CALLS and not called & {"sympify", "parse_expr"}, name
+        assert not {m.split(".")[0] for m in imports(name)} & {"pickle", "marshal", "shelve", "dill", "cloudpickle"}, name
 
 
 READERS = {"load", "full_load", "unsafe_load", "read_pickle", "Unpickler", "from_file", "fromfile", "memmap"}
 LIBRARIES = {"np", "numpy", "yaml", "ruamel", "torch", "joblib", "pandas", "pl"}
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_nothing_is_unpickled(name: str) -> None:
+def test_nothing_is_unpickled() -> None:
     """No library turns a file into objects by running what it holds: numpy.load says allow_pickle=False, YAML makes plain data."""
-    for call in (n for n in ast.walk(TREES[name]) if isinstance(n, ast.Call)):
+    for name, call in ((name, call) for name in MODULES for call in calls(name)):
         said = {k.arg: k.value.value for k in call.keywords if isinstance(k.value, ast.Constant)}
         called, place = ast.unparse(call.func), f"{name}, line {call.lineno}"
         if called.rpartition(".")[2] in READERS and called.partition(".")[0] in LIBRARIES:

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime import Record, load_model, study_from_mapping
+from runtime import Record, load_model
+from runtime.settings.study import study_from_mapping
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
 from symgen import generate_module, load_robot

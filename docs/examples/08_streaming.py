@@ -5,7 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime import load_model, observe, open_streams, read_records, reduce_records, study_from_mapping
+from runtime import load_model, observe
+from runtime.observation.by_blocks import reduce_records
+from runtime.records.reading import read_records
+from runtime.records.reading_by_blocks import open_streams
+from runtime.settings.study import study_from_mapping
 from runtime.estimators import estimate
 from symgen import generate_module, load_robot
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime import Record, load_model, observe, study_from_mapping
+from runtime import Record, load_model, observe
+from runtime.settings.study import study_from_mapping
 from runtime.identification.payload import payload
 from symgen import generate_module, load_robot
 

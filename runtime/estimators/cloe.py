@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.errors import InputError, SettingsError
+from runtime.errors import InputError
 from runtime.estimators import iv, ols
 from runtime.estimators.block_covariance import block_covariance, block_of_rows, default_block
 from runtime.estimators.closed_loop import ClosedLoop, loop_of
@@ -27,32 +27,41 @@ from runtime.estimators.fixed_point import Array, columns_of, full, initial
 from runtime.estimators.linear import assemble, outcome, standard_deviations
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import Observation
-from runtime.settings.schema import structure
+from runtime.settings.schema import Count, Positive, Real, Settings, structure
 from runtime.settings.study import EstimateSettings
 
 DAMPING = 1e-3  # of the diagonal of the scaled J'J, at the start
 RISE, FALL = 5.0, 0.3
 
 
-@dataclass(frozen=True)
-class Options:
-    """estimate.options of cloe. output : "position", or "torque" (CLIE).   start : "iv", "ols" or "values".   passes : of each of two searches.
+class CloeOptions(Settings):
+    """estimate.options of method cloe.
 
-    step, decrease : stop: largest |dX/D|, or relative decrease of the criterion.   reference, around : as for iv and didim.
+    Attributes
+    ----------
+    output : str
+        position, or torque (CLIE).
+    start : str
+        First parameters: iv, ols, or values of the robot file.
+    passes : int
+        Largest number of passes of each of two searches.
+    step : float
+        Largest |dX/D| at which a search ends.
+    decrease : float
+        Relative decrease of the criterion at which a search ends.
+    reference : str
+        known, or measured where the reference has to be inferred.
+    around : float, s
+        Time about slow rows that is left out with them.
     """
 
     output: Literal["position", "torque"] = "position"
     start: Literal["iv", "ols", "values"] = "iv"
-    passes: int = 30
-    step: float = 1e-4
-    decrease: float = 1e-6
+    passes: Count = 30
+    step: Positive = 1e-4
+    decrease: Positive = 1e-6
     reference: Literal["known", "measured"] = "known"
-    around: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("passes", "step", "decrease"):
-            if not getattr(self, name) > 0:
-                raise SettingsError(f"{getattr(self, name)!r}; expected a positive number", path=(name,))
+    around: Real = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +88,7 @@ def cloe(
 
     SettingsError where no loop is attached to the observation.
     """
-    loop, options = loop_of(observation, "cloe"), structure(Options, settings.options, ("estimate", "options"))
+    loop, options = loop_of(observation, "cloe"), structure(CloeOptions, settings.options, ("estimate", "options"))
     seen = columns_of(observation, settings)
     base = ols.system(seen, EstimateSettings())
     first = base.solve()
@@ -120,7 +129,7 @@ def cloe(
     )
 
 
-def _start(loop: ClosedLoop, seen: Observation, options: Options) -> Array:
+def _start(loop: ClosedLoop, seen: Observation, options: CloeOptions) -> Array:
     if options.start != "iv":
         return initial(loop, seen, options.start)
     return iv.iv(seen, EstimateSettings(method="iv"), model=loop.model).X
@@ -144,7 +153,7 @@ def _at(loop: ClosedLoop, seen: Observation, X: Array, y: Array, output: str, *,
 
 
 def _searched(
-    loop: ClosedLoop, seen: Observation, point: Point, y: Array, D: Array, weights: Array, options: Options, trail: list[dict[str, Any]]
+    loop: ClosedLoop, seen: Observation, point: Point, y: Array, D: Array, weights: Array, options: CloeOptions, trail: list[dict[str, Any]]
 ) -> tuple[Point, bool]:
     """Levenberg's steps down to a minimum of the weighted criterion."""
     damping = DAMPING

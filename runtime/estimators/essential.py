@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from runtime.estimators import linear_system
-from runtime.estimators.estimate import Estimate, aligned, json_text
+from runtime.estimators.estimate import Estimate, json_text
 from runtime.estimators.linear import System, assemble, standard_deviations
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import Observation
 from runtime.observation.reduction import Reduction
 from runtime.settings.study import EssentialSettings, EstimateSettings
+from runtime.table import aligned
 
 THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
 """Thresholds whose counts are reported beside the one used."""

@@ -26,7 +26,8 @@ from runtime import json_values as read
 from runtime.errors import InputError
 from runtime.json_documents import document, read_document
 from runtime.latex import parameter_table
-from runtime.reporting.notebook import estimate_html
+from runtime.markup import number
+from runtime.table import Table, notebook
 
 Array = np.ndarray
 
@@ -123,7 +124,7 @@ class Estimate:
         return self.to_table()
 
     def _repr_html_(self) -> str:
-        return estimate_html(self)
+        return notebook([*self._head(), *([self.message] if self.message else [])], *self.tables())
 
     def _repr_latex_(self) -> str:
         return self.to_latex()
@@ -169,21 +170,45 @@ class Estimate:
 
     def to_table(self) -> str:
         """Plain text: one line per parameter, one per joint."""
-        head = [
+        parameters, joints = self.tables()
+        note = ["", self.message] if self.message else []
+        return "\n".join([*self._head(), "", parameters.to_text(), "", joints.to_text(), *note])
+
+    def tables(self) -> tuple[Table, Table]:
+        """Parameters, then joints, line by line."""
+        parameters = [
+            (
+                name,
+                f"{self.X[i]:.6g}",
+                number(self.sigma[i], ".3g"),
+                number(self.relative_sigma[i], ".3f"),
+                number(self.sigma_corrected[i], ".3g"),
+                self.units.get(name, ""),
+            )
+            for i, name in enumerate(self.names)
+        ]
+        joints = [
+            (
+                fit.joint,
+                str(fit.rows),
+                f"{fit.residual_norm:.6g}",
+                number(fit.relative_error, ".3f"),
+                number(fit.sigma_rho, ".4g"),
+                f"{fit.scale:.4g}",
+            )
+            for fit in self.per_joint
+        ]
+        return (
+            Table("parameters", ("parameter", "value", "sigma", "%sigma", "corrected", "unit"), parameters, symbols=True),
+            Table("joints", ("joint", "rows", "residual norm", "relative error %", "sigma_rho", "scale"), joints),
+        )
+
+    def _head(self) -> tuple[str, str]:
+        return (
             f"{self.method}: {self.rows} rows, {len(self.names)} parameters, rank {self.rank}, status {self.status}",
             f"cond {self.cond:.4g} (unit columns {self.cond_unit:.4g}), sigma_rho {self.sigma_rho:.4g}, "
             f"residual norm {self.residual_norm:.6g}, relative error {self.relative_error:.3f} %",
-        ]
-        lines: list[Sequence[str]] = [("parameter", "value", "sigma", "%sigma", "corrected", "unit")]
-        for i, name in enumerate(self.names):
-            numbers = (f"{self.X[i]:.6g}", _number(self.sigma[i], ".3g"), _number(self.relative_sigma[i], ".3f"))
-            lines.append((name, *numbers, _number(self.sigma_corrected[i], ".3g"), self.units.get(name, "")))
-        joints: list[Sequence[str]] = [("joint", "rows", "residual norm", "relative error %", "sigma_rho", "scale")]
-        for fit in self.per_joint:
-            norms = (f"{fit.residual_norm:.6g}", _number(fit.relative_error, ".3f"), _number(fit.sigma_rho, ".4g"))
-            joints.append((fit.joint, str(fit.rows), *norms, f"{fit.scale:.4g}"))
-        note = ["", self.message] if self.message else []
-        return "\n".join([*head, "", aligned(lines), "", aligned(joints), *note])
+        )
 
     def to_latex(self, names: Sequence[str] | None = None, *, blocks: int = 1) -> str:
         """LaTeX tabular (booktabs) as the chapter's Table 2; `names` restricts and orders its lines, `blocks` stand side by side."""
@@ -195,16 +220,6 @@ class Estimate:
 def load_estimate(path: Path | str) -> Estimate:
     """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote; InputError as `Estimate.from_json`."""
     return _estimate(read_document(Path(path), SCHEMA), str(path))
-
-
-def aligned(lines: Sequence[Sequence[str]]) -> str:
-    """Columns of text under a header: the first column to the left, numbers to the right."""
-    widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]
-    text = []
-    for line in lines:
-        cells = [line[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True))]
-        text.append("  ".join(cells).rstrip())
-    return "\n".join(text)
 
 
 def plain(value: Any) -> Any:
@@ -289,7 +304,3 @@ def _joint_fit(value: Any) -> JointFit:
     for key, item in read.mapping(value).items():
         given[key] = read.text(item) if key == "joint" else read.whole(item) if key == "rows" else read.number(item)
     return JointFit(**given)
-
-
-def _number(value: float, form: str) -> str:
-    return format(value, form) if math.isfinite(value) else "-"

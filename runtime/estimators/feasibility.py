@@ -1,6 +1,6 @@
 """Can a physical robot have these base parameters, and which standard parameters would it have?
 
-    feasibility(X)            t* = max t: every condition of `runtime.estimators.physical` holds with margin t, and K chi = X. t* < 0: no robot has X
+    feasibility(X)            t* = max t: every condition of `runtime.model.inertia` holds with margin t, and K chi = X. t* < 0: no robot has X
     standard_parameters(X)    chi with K chi = X that fulfils every condition, nearest to the values of the robot file (or to zero)
 
 A negative t* is blamed on the condition with the largest multiplier; that one is released and the rest asked again, until it holds.
@@ -15,40 +15,51 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.physical import INERTIAL, PhysicalModel
 from runtime.estimators.semidefinite import FURTHEST, Distance, Found, Reference, Rows, closest, margin, solutions
+from runtime.model.inertia import INERTIAL, PhysicalModel
+from runtime.settings.schema import Positive, Real, Settings
 
 Array = np.ndarray
-Interval = tuple[float | None, float | None]
+Bounds = tuple[Real | None, Real | None]
 
 LEAST = 1e-6  # smallest eigenvalue, SI, that standard parameters keep where there is room
 ROUNDING = 1e-9  # t* above -ROUNDING is zero to the accuracy of the solver
 TYPICAL = {"X": 0.1, "Y": 0.1, "Z": 0.1, "MX": 0.3, "MY": 0.3, "MZ": 0.3, "M": 3.0}  # kg m^2, kg m, kg; scales of the unknowns only
 
 
-@dataclass(frozen=True)
-class Ellipsoid:
-    """Where the mass of a link lies: centre and semi-axes, m, along the axes of the link frame."""
+class Ellipsoid(Settings):
+    """Ellipsoid that holds the mass of a link.
 
-    centre: tuple[float, float, float]
-    axes: tuple[float, float, float]
-
-    def __post_init__(self) -> None:
-        if not all(a > 0 for a in self.axes):
-            raise SettingsError(f"{self.axes}; expected three positive lengths", path=("axes",))
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What is known beforehand.
-
-    bounds : [lowest, highest] of standard parameters, by name.   total_mass : kg, of all links together, a number or [lowest, highest].
-    centre : box of the centre of mass by link, m, link frame.   ellipsoid : that holds the mass, by link.
+    Attributes
+    ----------
+    centre : tuple of 3 float, m
+        Centre, in the link frame.
+    axes : tuple of 3 float, m
+        Semi-axes, along the axes of the link frame.
     """
 
-    bounds: Mapping[str, Interval] = field(default_factory=dict)
-    total_mass: float | tuple[float, float] | None = None
-    centre: Mapping[str, tuple[tuple[float, float], tuple[float, float], tuple[float, float]]] = field(default_factory=dict)
+    centre: tuple[Real, Real, Real]
+    axes: tuple[Positive, Positive, Positive]
+
+
+class Limits(Settings):
+    """Knowledge about the standard parameters of a robot.
+
+    Attributes
+    ----------
+    bounds : mapping of pairs of float or None, SI
+        [lowest, highest] of standard parameters, by name.
+    total_mass : float, pair of float, or None, kg
+        Mass of all links together, a number or [lowest, highest].
+    centre : mapping of 3 pairs of float, m
+        Box of the centre of mass, by link, in the link frame.
+    ellipsoid : mapping of Ellipsoid
+        Ellipsoid that holds the mass, by link.
+    """
+
+    bounds: Mapping[str, Bounds] = field(default_factory=dict)
+    total_mass: Real | tuple[Real, Real] | None = None
+    centre: Mapping[str, tuple[tuple[Real, Real], tuple[Real, Real], tuple[Real, Real]]] = field(default_factory=dict)
     ellipsoid: Mapping[str, Ellipsoid] = field(default_factory=dict)
 
 

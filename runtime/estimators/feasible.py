@@ -3,7 +3,7 @@
     min ||R (z - K chi)||^2 + weight D(chi)      subject to  P_j(chi) >= margin 1, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
 
-W is factored once and b rows enter the semidefinite program (`runtime.estimators.semidefinite`); the conditions are those of `runtime.estimators.physical`. All base
+W is factored once and b rows enter the semidefinite program (`runtime.estimators.semidefinite`); the conditions are those of `runtime.model.inertia`. All base
 parameters are fitted, essential or not: a condition ties every parameter of a link. With the columns of some parameters alone, the others
 are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls. Where least squares is feasible, it is the solution.
 
@@ -26,23 +26,23 @@ Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018); Lee, Wens
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from runtime.errors import InputError, SettingsError
+from runtime.errors import InputError
 from runtime.estimators import ols, wls
 from runtime.estimators.block_covariance import block_of_rows, default_block
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
 from runtime.estimators.linear import System, assemble
-from runtime.estimators.physical import PhysicalModel, physical_model
 from runtime.estimators.semidefinite import Distance, Found, Rows, closest, everything
 from runtime.model.generated import GeneratedModel
+from runtime.model.inertia import PhysicalModel, physical_model
 from runtime.observation.observation import Observation
 from runtime.observation.qr_factor import Array, Factor, factor
-from runtime.settings.schema import structure
+from runtime.settings.schema import NotNegative, Positive, Resamples, Seed, require, structure
 from runtime.settings.study import EstimateSettings
 
 INCREASE = 1.01  # of the residual norm that weight: auto allows
@@ -50,28 +50,36 @@ WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)
 ACTIVE = 2.0  # a condition within this factor of the margin is active
 
 
-@dataclass(frozen=True)
-class Options(Limits):
-    """estimate.options of method feasible."""
+class FeasibleOptions(Limits):
+    """estimate.options of method feasible; those of `Limits` too.
 
-    margin: float = 1e-6
+    Attributes
+    ----------
+    margin : float, SI
+        Smallest eigenvalue of every condition.
+    prior : str
+        Distance D of the inertial parameters from the values of the robot file: none, euclidean, entropic or pullback.
+    weight : float or str
+        Weight of D; auto: the largest, to half a decade, that raises the residual norm by at most 1 %; held-out: that by which the two
+        halves of the record in time predict each other best.
+    bootstrap : int
+        Resampled records (blocks of time) behind `sigma_corrected`; 0: none.
+    seed : int
+        Seed of the bootstrap.
+    linear : mapping
+        Options of the least squares that starts the method: rank_tolerance, block.
+    """
+
+    margin: Positive = 1e-6
     prior: Distance = "none"
-    weight: float | Literal["auto", "held-out"] = "auto"
-    bootstrap: int = 30
-    seed: int = 1
+    weight: NotNegative | Literal["auto", "held-out"] = "auto"
+    bootstrap: Resamples = 30
+    seed: Seed = 1
     linear: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not self.margin > 0:
-            raise SettingsError(f"{self.margin}; expected a positive number", path=("margin",))
-        if not isinstance(self.weight, str) and self.weight < 0:
-            raise SettingsError(f"{self.weight}; expected auto, held-out, or 0 or more", path=("weight",))
-        if self.prior == "none" and not isinstance(self.weight, str):
-            raise SettingsError(f"{self.weight} without prior; set prior: euclidean, entropic or pullback", path=("weight",))
-        if self.bootstrap == 1 or self.bootstrap < 0 or self.seed < 0:
-            raise SettingsError(
-                f"{self.bootstrap} runs, seed {self.seed}; expected 0 or at least 2 runs, and a seed from 0", path=("bootstrap",)
-            )
+        message = f"{self.weight} without prior; set prior: euclidean, entropic or pullback"
+        require(self.prior != "none" or isinstance(self.weight, str), message, "weight")
 
 
 def feasible(
@@ -84,7 +92,7 @@ def feasible(
     """The feasible Estimate; `details` holds the standard parameters, the smallest eigenvalues, and what least squares gave."""
     if model is None:
         raise InputError("method feasible needs the model: it knows which parameters belong to one link")
-    options = structure(Options, settings.options, ("estimate", "options"))
+    options = structure(FeasibleOptions, settings.options, ("estimate", "options"))
     physical = physical_model(model)
     system = linear(observation, settings, options)
     free = system.solve()
@@ -128,14 +136,14 @@ def feasible(
     return replace(estimate, message=message, details=details, sigma_corrected=scatter)
 
 
-def linear(observation: Observation, settings: EstimateSettings, options: Options) -> System:
+def linear(observation: Observation, settings: EstimateSettings, options: FeasibleOptions) -> System:
     """The rows as ols or wls weighs them."""
     if settings.weights == "none":
         return ols.system(observation, EstimateSettings("ols", "none", settings.columns, options.linear))
     return wls.system(observation, EstimateSettings("wls", settings.weights, settings.columns, options.linear))
 
 
-def weighed(rows: Factor, physical: PhysicalModel, options: Options) -> tuple[Array, float]:
+def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> tuple[Array, float]:
     """chi of a factored system, and the weight of D."""
     K = physical.rows(rows.names)
     size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
@@ -155,7 +163,7 @@ def weighed(rows: Factor, physical: PhysicalModel, options: Options) -> tuple[Ar
     return at(0.0), 0.0
 
 
-def held_out_weight(observation: Observation, system: System, physical: PhysicalModel, options: Options) -> float:
+def held_out_weight(observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions) -> float:
     """The weight of D by which the halves of the record predict each other best."""
     if options.prior == "none":
         return 0.0
@@ -178,7 +186,7 @@ def part_factor(part: Observation, system: System) -> Factor:
     return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(1 / np.array(system.scales))
 
 
-def fitted(R: Array, z: Array, physical: PhysicalModel, options: Options, weight: float = 0.0) -> Array:
+def fitted(R: Array, z: Array, physical: PhysicalModel, options: FeasibleOptions, weight: float = 0.0) -> Array:
     """chi, shape (p,), of min ||R chi - z||^2 + weight D(chi) under the conditions; R (m, p), z (m,), ||z|| about 1."""
     rows, space = limit_rows(physical, options), everything(scales(physical))
     pull = pulled(physical, options.prior, weight)
@@ -197,7 +205,7 @@ def residual_norm(rows: Factor, X: Array) -> float:
     return float(np.hypot(rows.r22, np.linalg.norm(rows.R11 @ X - rows.r12)))
 
 
-def bootstrapped(observation: Observation, system: System, physical: PhysicalModel, options: Options, weight: float) -> Array:
+def bootstrapped(observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions, weight: float) -> Array:
     """Scatter of X, shape (b,), over records whose blocks of time are drawn with replacement; weights of the joints stay."""
     block = block_of_rows(observation, default_block(observation))
     blocks = int(block.max()) + 1

@@ -20,7 +20,7 @@ from runtime.errors import InputError, SettingsError
 from runtime.estimators import ols
 from runtime.estimators.closed_loop import ClosedLoop, Run
 from runtime.observation.observation import Observation
-from runtime.settings.schema import structure
+from runtime.settings.schema import Count, Positive, Real, Settings, structure
 from runtime.settings.study import EstimateSettings
 
 Array = np.ndarray
@@ -31,29 +31,35 @@ ROUGH = 10.0  # the stop of passes with rescaled gains, which only lead to the l
 MEMORY = 3  # differences that the next step is made of
 
 
-@dataclass(frozen=True)
-class Options:
-    """estimate.options of iv and didim.
+class FixedPointOptions(Settings):
+    """estimate.options of methods iv and didim.
 
-    start : X^0: "ols", "values" of the robot file, "unit" (motor inertia, else inertia or mass of the own link, 1 for every joint; rest 0), or
+    Attributes
+    ----------
+    start : str or mapping of float
+        X^0: ols, values of the robot file, unit (motor inertia, else inertia or mass of the own link, 1 for every joint; rest 0), or
         parameters by name, the others 0.
-    gains : X_ref of g: "ols", "values", "start", or "one" (no rescaling).   passes : largest number with rescaled gains, and with g = 1.
-    change, residual : the stop.   reference : "known", or "measured" where the reference has to be inferred, and around : s about slow rows that are left
-    out with them (`runtime.estimators.closed_loop`).
+    gains : str
+        X_ref of g: ols, values, start, or one (no rescaling).
+    passes : int
+        Largest number of passes with rescaled gains, and with g = 1.
+    change : float
+        Largest change of a parameter over its deviation at which the passes end.
+    residual : float
+        Relative change of the residual at which the passes end.
+    reference : str
+        known, or measured where the reference has to be inferred.
+    around : float, s
+        Time about slow rows that is left out with them (`runtime.estimators.closed_loop`).
     """
 
-    start: Literal["ols", "values", "unit"] | Mapping[str, float] = "ols"
+    start: Literal["ols", "values", "unit"] | Mapping[str, Real] = "ols"
     gains: Literal["ols", "values", "start", "one"] = "ols"
-    passes: int = 15
-    change: float = 0.1
-    residual: float = 1e-3
+    passes: Count = 15
+    change: Positive = 0.1
+    residual: Positive = 1e-3
     reference: Literal["known", "measured"] = "known"
-    around: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("passes", "change", "residual"):
-            if not getattr(self, name) > 0:
-                raise SettingsError(f"{getattr(self, name)!r}; expected a positive number", path=(name,))
+    around: Real = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +83,9 @@ class Fixed:
     message: str = ""
 
 
-def options_of(settings: EstimateSettings) -> Options:
+def options_of(settings: EstimateSettings) -> FixedPointOptions:
     """The options of a study, checked."""
-    return structure(Options, settings.options, ("estimate", "options"))
+    return structure(FixedPointOptions, settings.options, ("estimate", "options"))
 
 
 def columns_of(observation: Observation, settings: EstimateSettings) -> Observation:
@@ -130,7 +136,7 @@ def initial(loop: ClosedLoop, seen: Observation, which: str | Mapping[str, float
     return np.array([X[name] for name in names])
 
 
-def iterate(loop: ClosedLoop, seen: Observation, options: Options, update: Callable[[Sequence[Run], Array], Step]) -> Fixed:
+def iterate(loop: ClosedLoop, seen: Observation, options: FixedPointOptions, update: Callable[[Sequence[Run], Array], Step]) -> Fixed:
     """The fixed point of X -> update(simulation with X, X), X of the columns of `seen`."""
     names, every = seen.names, loop.model.BASE_PARAMETERS
     X = initial(loop, seen, options.start)
@@ -210,7 +216,7 @@ def _contraction(changes: Sequence[float]) -> float:
     return changes[-1] / changes[-2] if len(changes) > 1 and changes[-2] > 0 else float("nan")
 
 
-def told(loop: ClosedLoop, fixed: Fixed, options: Options, method: str) -> tuple[str, str]:
+def told(loop: ClosedLoop, fixed: Fixed, options: FixedPointOptions, method: str) -> tuple[str, str]:
     """Status and message of an Estimate."""
     parts = [part for part in (fixed.message, loop.assumption) if part]
     if not fixed.converged:

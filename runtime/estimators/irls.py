@@ -31,7 +31,7 @@ from runtime.estimators.solution import solve
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import Observation
 from runtime.observation.qr_factor import Array, Factor, factor
-from runtime.settings.schema import structure
+from runtime.settings.schema import Count, Positive, Settings, structure
 from runtime.settings.study import EstimateSettings
 
 TUNING = {"huber": 1.345, "tukey": 4.685}
@@ -45,21 +45,28 @@ SUSPECT = 0.05
 """Share of down-weighted rows of a joint above which the model is suspected."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """estimate.options of method irls. tuning : k of huber or c of tukey; default: 1.345, 4.685."""
+class IrlsOptions(Settings):
+    """estimate.options of method irls.
+
+    Attributes
+    ----------
+    loss : str
+        huber or tukey.
+    tuning : float or None
+        k of huber or c of tukey; default: 1.345, 4.685.
+    passes : int
+        Largest number of passes.
+    block : float or None, s
+        Length of the blocks of time behind `sigma_corrected`.
+    rank_tolerance : float or None
+        Singular value, relative to the largest, below which the rank ends.
+    """
 
     loss: Literal["huber", "tukey"] = "huber"
-    tuning: float | None = None
-    passes: int = 50
-    block: float | None = None
-    rank_tolerance: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("tuning", "passes", "block", "rank_tolerance"):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
-                raise SettingsError(f"{value!r}; expected a positive number", path=(name,))
+    tuning: Positive | None = None
+    passes: Count = 50
+    block: Positive | None = None
+    rank_tolerance: Positive | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +92,7 @@ def irls(
     """The robust Estimate; `details` holds the scales S_j and the share of down-weighted rows by joint."""
     if settings.weights != "none":
         raise SettingsError(f"{settings.weights!r} with method irls, which finds its own weights", path=("estimate", "weights"))
-    options = structure(Options, settings.options, ("estimate", "options"))
+    options = structure(IrlsOptions, settings.options, ("estimate", "options"))
     start = wls.system(observation, replace(settings, method="wls", options=_linear(options)))
     first = start.solve()
     if first.rank < len(start.names):
@@ -113,7 +120,7 @@ def slope(u: Array, loss: str, tuning: float) -> Array:
     return np.where(inside, 1.0 if loss == "huber" else (1 - v) * (1 - 5 * v), 0.0)
 
 
-def _iterated(observation: Observation, W: Array, raw: Factor, X: Array, loss: str, options: Options) -> Fit:
+def _iterated(observation: Observation, W: Array, raw: Factor, X: Array, loss: str, options: IrlsOptions) -> Fit:
     """Weights and parameters in turn, from X."""
     tuning = _tuning(options, loss)
     for done in range(1, options.passes + 1):
@@ -149,7 +156,7 @@ def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
 def _estimate(
     observation: Observation,
     settings: EstimateSettings,
-    options: Options,
+    options: IrlsOptions,
     start: System,
     W: Array,
     fit: Fit,
@@ -196,11 +203,11 @@ def _told(shares: Mapping[str, float]) -> str:
     return text
 
 
-def _tuning(options: Options, loss: str) -> float:
+def _tuning(options: IrlsOptions, loss: str) -> float:
     """k of Huber or c of Tukey; the start of Tukey by Huber keeps Huber's own k."""
     return options.tuning if options.tuning is not None and loss == options.loss else TUNING[loss]
 
 
-def _linear(options: Options) -> dict[str, float]:
+def _linear(options: IrlsOptions) -> dict[str, float]:
     given = {"block": options.block, "rank_tolerance": options.rank_tolerance}
     return {key: value for key, value in given.items() if value is not None}

@@ -1,173 +1,22 @@
-"""Which parameters a physical robot can have: every link has a mass density, actuators have inertia, friction takes power.
-
-Base parameters are X = K chi, chi the standard parameters. Of link j, with J the inertia tensor about the origin of its frame (the elements XX .. ZZ
-as they are) and l = (MX, MY, MZ), the pseudo-inertia
-
-    P_j = [[tr(J)/2 1 - J, l], [l', M]],   4 x 4,
-
-is the matrix of second moments of the density in homogeneous coordinates: a density exists if and only if P_j is positive semidefinite, which holds
-the triangle inequalities of the moments of inertia. Every element along s = G q (inertia, viscous, Coulomb) asks for c >= 0. Elements given as forms
-q'Bq act together with those along the same joints: the sum of c_k B_k of one kind is positive semidefinite (the inertia of a coupled wrist,
-the power its viscous friction takes). Friction of one direction of motion counts in that direction and leaves forms alone. Offsets and springs
-have no sign.
-
-References: Wensing, Kim and Slotine (2018) for P_j; Sousa and Cortesao (2014, 2019) for identification under such constraints.
-"""
+"""Estimates that no drive has: motor inertias and frictions that are certainly negative. The conditions themselves: `runtime.model.inertia`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, cast
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from runtime.errors import InputError, ModelError
 from runtime.estimators.estimate import Estimate
-from runtime.model.generated import GeneratedModel, require
+from runtime.model.generated import GeneratedModel
+from runtime.model.inertia import SIGNED, is_form
 
-Array = np.ndarray
-
-INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
-SIGNED = ("inertia", "viscous", "coulomb")  # kinds of elements whose parameter is not negative
 CERTAIN = 3.0  # deviations
-FORMED = ("inertia", "viscous")  # kinds whose forms must be positive semidefinite
-
-
-@dataclass(frozen=True, eq=False)
-class Condition:
-    """The matrix sum_k chi[numbers[k]] B[k] is positive semidefinite; numbers count the standard parameters, B has shape (k, m, m)."""
-
-    name: str
-    numbers: tuple[int, ...]
-    B: Array
-
-    def matrix(self, chi: Array) -> Array:
-        """The matrix at chi, shape (m, m)."""
-        return np.asarray(np.tensordot(chi[list(self.numbers)], self.B, axes=1))
-
-    def smallest(self, chi: Array) -> float:
-        """Its smallest eigenvalue."""
-        return float(np.linalg.eigvalsh(self.matrix(chi))[0])
-
-
-@dataclass(frozen=True, eq=False)
-class PhysicalModel:
-    """What a model says about its standard parameters.
-
-    standard, base : names, p and b of them.   K : ndarray, shape (b, p), X = K chi.   values : those of the robot file, by name.
-    links : numbers of the links that have inertia.   conditions : one per link, then one per form, then one per signed element.
-    """
-
-    standard: tuple[str, ...]
-    base: tuple[str, ...]
-    K: Array
-    links: tuple[int, ...]
-    conditions: tuple[Condition, ...]
-    values: Mapping[str, float]
-
-    def link(self, j: int) -> list[int]:
-        """Where the ten parameters of link j stand among the standard ones, in the order of INERTIAL."""
-        if j not in self.links:
-            raise InputError(f"link {j} has no inertial parameters; links are {', '.join(map(str, self.links))}")
-        return [self.standard.index(f"{family}{j}") for family in INERTIAL]
-
-    def named(self, chi: Array) -> dict[str, float]:
-        """Standard parameters by name."""
-        return {name: float(value) for name, value in zip(self.standard, chi, strict=True)}
-
-    def smallest(self, chi: Array) -> dict[str, float]:
-        """The smallest eigenvalue of every condition, by its name: not negative for a physical robot."""
-        return {condition.name: condition.smallest(chi) for condition in self.conditions}
-
-    def rows(self, names: Sequence[str]) -> Array:
-        """The rows of K of the base parameters `names`."""
-        return self.K[[self.base.index(name) for name in names]]
-
-
-def physical_model(model: GeneratedModel, constants: Mapping[str, float] | None = None) -> PhysicalModel:
-    """The conditions of an emitted model. constants : geometry other than that of the robot file, as for `base_parameters`."""
-    require(model, "base_parameters")
-    missing = [name for name in ("STANDARD_PARAMETERS", "LINKS", "ELEMENTS") if not hasattr(model, name)]
-    if missing:
-        raise ModelError(f"no {', '.join(missing)}; emit it again with this version of symgen", file=model.NAME)
-    emitted = cast(Any, model)
-    standard: tuple[str, ...] = tuple(emitted.STANDARD_PARAMETERS)
-    return PhysicalModel(
-        standard=standard,
-        base=tuple(model.BASE_PARAMETERS),
-        K=np.asarray(emitted.base_parameters(np.eye(len(standard)), **(constants or {})), dtype=float),
-        links=tuple(emitted.LINKS),
-        conditions=(*_links(emitted.LINKS, standard), *_forms(emitted.ELEMENTS, standard), *_signs(emitted.ELEMENTS, standard)),
-        values=dict(model.VALUES),
-    )
 
 
 def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
     """Motor inertias and frictions of their own column that are negative by more than CERTAIN corrected deviations: no drive has them."""
     elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
-    signed = {name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not _is_form(acts)}
+    signed = {name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not is_form(acts)}
     sigma = np.fmax(fit.sigma, fit.sigma_corrected)
     return tuple(name for i, name in enumerate(fit.names) if name in signed and fit.X[i] < -CERTAIN * sigma[i])
-
-
-def pseudo_inertia(ten: Array) -> Array:
-    """P_j, shape (4, 4), of the ten parameters of a link in the order of INERTIAL, about the origin of its frame."""
-    XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = ten
-    J = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
-    l = np.array([[MX, MY, MZ]])
-    return np.block([[np.trace(J) / 2 * np.eye(3) - J, l.T], [l, np.array([[M]])]])
-
-
-def _links(links: Sequence[int], standard: Sequence[str]) -> Iterator[Condition]:
-    B = np.array([pseudo_inertia(ten) for ten in np.eye(10)])
-    for j in links:
-        yield Condition(f"link {j}", tuple(standard.index(f"{family}{j}") for family in INERTIAL), B)
-
-
-def _forms(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Condition]:
-    """One condition per kind and per group of joints that forms of that kind couple."""
-    for kind in FORMED:
-        own = {name: _form(acts) for name, (k, when, acts) in elements.items() if k == kind and when == "both"}
-        for joints in _coupled([{i for pair in own[name] for i in pair} for name in own if _is_form(elements[name][2])]):
-            place = {j: k for k, j in enumerate(sorted(joints))}
-            members = [name for name in own if {i for pair in own[name] for i in pair} <= joints]
-            B = np.zeros((len(members), len(place), len(place)))
-            for k, name in enumerate(members):
-                for (i, m), b in own[name].items():
-                    B[k, place[i], place[m]] = B[k, place[m], place[i]] = b
-            names = ", ".join(map(str, sorted(joints)))
-            yield Condition(f"{kind} of joints {names}", tuple(standard.index(name) for name in members), B)
-
-
-def _signs(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Condition]:
-    """c >= 0 along each row; where friction of one direction is set on that of both, their sum in either direction."""
-    along: dict[tuple[Any, ...], dict[str, list[str]]] = {}
-    for name, (kind, when, acts) in elements.items():
-        if kind in SIGNED and not _is_form(acts):
-            along.setdefault((kind, *sorted(acts.items())), {}).setdefault(when, []).append(name)
-    for own in along.values():
-        both, sided = own.get("both", []), [own.get(when, []) for when in ("positive", "negative")]
-        for names in [[*both, *one] for one in sided] if any(sided) else [[name] for name in both]:
-            if names:
-                yield Condition(" + ".join(names), tuple(standard.index(name) for name in names), np.ones((len(names), 1, 1)))
-
-
-def _is_form(acts: Mapping[Any, float]) -> bool:
-    return any(isinstance(key, tuple) for key in acts)
-
-
-def _form(acts: Mapping[Any, float]) -> dict[tuple[int, int], float]:
-    """The form q'Bq of an element as {(i, j): B_ij}, i <= j; along s = G q it is (G q)**2."""
-    if _is_form(acts):
-        return dict(acts)
-    return {(i, j): a * b for i, a in acts.items() for j, b in acts.items() if i <= j}
-
-
-def _coupled(groups: Sequence[set[int]]) -> list[set[int]]:
-    """Sets that share a joint, united."""
-    united: list[set[int]] = []
-    for group in groups:
-        touching = [other for other in united if other & group]
-        united = [other for other in united if not other & group] + [group.union(*touching)]
-    return united

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from runtime.errors import InputError
-from runtime.estimators.physical import Condition
+from runtime.model.inertia import Condition
 
 Array = np.ndarray
 Distance = Literal["none", "euclidean", "entropic", "pullback"]

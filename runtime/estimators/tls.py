@@ -36,7 +36,7 @@ from runtime.estimators.linear import System, assemble
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import Observation
 from runtime.observation.qr_factor import Array, triangularise
-from runtime.settings.schema import structure
+from runtime.settings.schema import NotNegative, PerJoint, Positive, Real, Resamples, Seed, Settings, structure
 from runtime.settings.study import EstimateSettings
 
 HIDDEN = 0.9
@@ -51,27 +51,31 @@ LEAST = 0.05
 """Least torque noise, of the residual: where the errors assumed explain more than the residual."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """estimate.options of method tls."""
+class TlsOptions(Settings):
+    """estimate.options of method tls.
 
-    position_error: float
-    torque_error: float | tuple[float, ...] | None = None
-    bootstrap: int = 100
-    seed: int = 1
-    block: float | None = None
-    rank_tolerance: float | None = None
+    Attributes
+    ----------
+    position_error : float, rad or m
+        Deviation of one raw position on the side cestac.side.
+    torque_error : float, tuple of float, or None, N m or N
+        Deviation t_j of the torque of each joint; default: from the residuals.
+    bootstrap : int
+        Resampled records behind `sigma`; 0: that of least squares.
+    seed : int
+        Seed of the bootstrap.
+    block : float or None, s
+        Length of the blocks of time.
+    rank_tolerance : float or None
+        Singular value, relative to the largest, below which the rank ends.
+    """
 
-    def __post_init__(self) -> None:
-        if self.position_error < 0:
-            raise SettingsError(f"{self.position_error}; expected 0 or a positive deviation", path=("position_error",))
-        torque = self.torque_error if isinstance(self.torque_error, tuple) else (self.torque_error,)
-        if any(t is not None and not t > 0 for t in torque):
-            raise SettingsError(f"{self.torque_error}; expected positive deviations", path=("torque_error",))
-        if self.bootstrap == 1 or self.bootstrap < 0 or self.seed < 0:
-            raise SettingsError(
-                f"{self.bootstrap} runs, seed {self.seed}; expected 0 or at least 2 runs, and a seed from 0", path=("bootstrap",)
-            )
+    position_error: NotNegative
+    torque_error: PerJoint[Positive] | None = None
+    bootstrap: Resamples = 100
+    seed: Seed = 1
+    block: Real | None = None
+    rank_tolerance: Real | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,15 +142,15 @@ def tls(
     return replace(found, covariance=C, sigma=sigma, sigma_corrected=sigma)
 
 
-def tls_options(settings: EstimateSettings) -> Options:
+def tls_options(settings: EstimateSettings) -> TlsOptions:
     """Checked estimate.options; the deviation of the positions has no default."""
     if "position_error" not in settings.options:
         message = "missing; tls needs the deviation of one raw position, rad or m on the side cestac.side (a step Delta rounded to the nearest: Delta/sqrt(12))"
         raise SettingsError(message, path=("estimate", "options", "position_error"))
-    return structure(Options, settings.options, ("estimate", "options"))
+    return structure(TlsOptions, settings.options, ("estimate", "options"))
 
 
-def split_columns(seen: Observation, options: Options) -> Split:
+def split_columns(seen: Observation, options: TlsOptions) -> Split:
     """Exact and noisy columns, from seen.errors; all exact where the positions are."""
     b = len(seen.names)
     if options.position_error == 0:
@@ -161,7 +165,7 @@ def split_columns(seen: Observation, options: Options) -> Split:
     return Split(np.flatnonzero(~noisy), np.flatnonzero(noisy), seen.errors)
 
 
-def torque_errors(seen: Observation, settings: EstimateSettings, split: Split, options: Options, X: Array) -> Array:
+def torque_errors(seen: Observation, settings: EstimateSettings, split: Split, options: TlsOptions, X: Array) -> Array:
     """t_j, shape (n,): as given, or t_j^2 = mean e_j^2 - X'C_j X at the solution; one for all joints without weights."""
     if options.torque_error is not None:
         given = (
@@ -228,7 +232,7 @@ def total(R: Array, split: Split, L: Array) -> Solved:
     return Solved(X, float(s[-1]), float(np.linalg.svd(R22[:, :b2], compute_uv=False)[-1]), float(abs(v[-1])))
 
 
-def bootstrap_covariance(seen: Observation, split: Split, t: Array, options: Options) -> Array:
+def bootstrap_covariance(seen: Observation, split: Split, t: Array, options: TlsOptions) -> Array:
     """Covariance of X over resampled blocks of time, shape (b, b), from one triangular factor per block."""
     A, L = _rows(seen, split, t), error_root(seen, split, t)
     blocks = block_of_rows(seen, default_block(seen) if options.block is None else options.block)
@@ -246,7 +250,7 @@ def _rows(seen: Observation, split: Split, t: Array) -> Array:
     return np.asarray(np.column_stack([seen.W[:, order], seen.Y]) / np.repeat(t, seen.rows)[:, None])
 
 
-def _linear(observation: Observation, settings: EstimateSettings, options: Options) -> System:
+def _linear(observation: Observation, settings: EstimateSettings, options: TlsOptions) -> System:
     """Least squares of the same rows, weighted as `weights` says."""
     given = {"block": options.block, "rank_tolerance": options.rank_tolerance}
     linear = {key: value for key, value in given.items() if value is not None}

@@ -25,7 +25,8 @@ from runtime.model.generated import GeneratedModel
 from runtime.parallel import results
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.study import Study
-from runtime.settings.trajectories import Fourier, Motion, Part, motion_from_mapping
+from runtime.settings.families import Fourier
+from runtime.settings.trajectories import Motion, Part, motion_from_mapping
 
 SOFT = 1e-6  # violation of a constraint that IPOPT aims at, of its scale
 TOLERATED = 1e-3  # violation at the points of the grid of a start that is looked at

@@ -28,19 +28,19 @@ from scipy.optimize import nnls
 
 from runtime.errors import InputError
 from runtime.estimators.block_covariance import block_of_rows, default_block
-from runtime.estimators.estimate import aligned
 from runtime.estimators.linear import assemble
 from runtime.estimators.ols import system
-from runtime.estimators.physical import physical_model
 from runtime.identification.payload import carried
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
+from runtime.model.inertia import physical_model
 from runtime.observation.filters import filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, stack
 from runtime.observation.qr_factor import triangularise
 from runtime.observation.rows import select_rows
 from runtime.records.record import Record
 from runtime.settings.study import EstimateSettings, PayloadSettings, Study
+from runtime.table import aligned
 
 Array = np.ndarray
 

@@ -27,8 +27,7 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.estimators.block_covariance import block_of_rows, default_block
-from runtime.estimators.estimate import Estimate, aligned
-from runtime.estimators.physical import physical_model
+from runtime.estimators.estimate import Estimate
 from runtime.identification.friction_laws import (
     LAWS,
     Terms,
@@ -42,11 +41,13 @@ from runtime.identification.friction_laws import (
     percent,
 )
 from runtime.model.generated import GeneratedModel, require
+from runtime.model.inertia import physical_model
 from runtime.observation.filters import decimated, filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states
 from runtime.observation.rows import select_rows
 from runtime.records.record import Record
 from runtime.settings.study import Study
+from runtime.table import aligned
 
 Array = np.ndarray
 

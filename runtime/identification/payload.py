@@ -23,14 +23,15 @@ import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators import estimate
-from runtime.estimators.estimate import Estimate, aligned
-from runtime.estimators.physical import INERTIAL, PhysicalModel, physical_model
+from runtime.estimators.estimate import Estimate
 from runtime.estimators.solution import Solution, solve
 from runtime.model.generated import GeneratedModel
+from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
 from runtime.model.mount import Mount, load_vector, mount
 from runtime.observation.observation import Observation, stack
 from runtime.observation.qr_factor import Factor, triangularise
 from runtime.settings.study import EstimateSettings, PayloadSettings
+from runtime.table import aligned
 
 Array = np.ndarray
 

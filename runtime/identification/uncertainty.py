@@ -24,13 +24,14 @@ from scipy.special import fdtrc
 from runtime.estimators import linear_companion, linear_system
 from runtime.estimators.block_covariance import block_of_rows
 from runtime.estimators.essential import Essential
-from runtime.estimators.estimate import Estimate, aligned
+from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import System, whitened
 from runtime.identification.residuals import SIGNIFICANT, Whiteness, effective_share, whiteness
 from runtime.identification.validation import Comparison
 from runtime.observation.observation import Observation
 from runtime.observation.reduction import Reduction
 from runtime.settings.study import EstimateSettings
+from runtime.table import aligned
 
 Array = np.ndarray
 

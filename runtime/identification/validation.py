@@ -18,12 +18,13 @@ from scipy.sparse.csgraph import connected_components
 
 from runtime.errors import InputError
 from runtime.estimators import estimate, linear_companion, linear_system, point_estimate
-from runtime.estimators.estimate import Estimate, aligned, json_text
+from runtime.estimators.estimate import Estimate, json_text
 from runtime.estimators.solution import unit_columns
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import Observation
 from runtime.observation.reduction import Reduction, Window
 from runtime.settings.study import EstimateSettings
+from runtime.table import aligned
 
 Array = np.ndarray
 

@@ -15,13 +15,14 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Protocol, cast
 
 import numpy as np
 
 from runtime.errors import InputError
 from runtime.model.compile_cache import FallbackWarning, NotCompiledError, cache_folder, shared_object
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, ModelText
 
 Array = np.ndarray
 
@@ -196,6 +197,32 @@ class CompiledModel:
         status = getattr(self._library, f"{self._model.NAME}_{name}")(ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream))
         if status:
             raise InputError(f"{self._model.NAME}: {name} in C refused its arguments with {status}")
+
+
+@dataclass(frozen=True)
+class CompiledText(ModelText):
+    """Module and C file of a model as text, for another process, which compiles into its own cache."""
+
+    source: bytes = b""
+
+    def load(self) -> GeneratedModel:
+        """The compiled model; InputError where it cannot be compiled there, as NumPy would not give the same bits."""
+        module = super().load()
+        with TemporaryDirectory(prefix="symgen-") as folder:
+            path = Path(folder) / Path(self.name).with_suffix(".c")
+            path.write_bytes(self.source)
+            model = compiled_model(module, source=path)
+        if not isinstance(model, CompiledModel):
+            raise InputError(
+                f"a worker has no compiled {module.NAME} (its log says why); use --target numpy, or install a C compiler there"
+            )
+        return model
+
+
+def text_of(model: GeneratedModel) -> ModelText:
+    """The model as text, for another process: module and, of a compiled model, C file."""
+    module = ModelText.of(model)
+    return CompiledText(module.name, module.text, module.digest, model.source) if isinstance(model, CompiledModel) else module
 
 
 def _signals(library: ctypes.CDLL, model: GeneratedModel) -> Signals:

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any, Protocol, cast
 
@@ -22,6 +25,7 @@ Array = np.ndarray
 
 FOLDER = Path("generated")  # of the current folder
 CONSTANTS = ("NAME", "JOINTS", "BASE_PARAMETERS", "STRUCTURE", "DRIVES", "LIMITS", "VALUES", "CONSTANTS", "SOURCE_SHA256")
+SLIDING = frozenset({"kg", "N", "N*s/m", "N/m"})  # units of elements along a joint that slides
 FUNCTIONS = ("store", "regressor", "observation_matrix")  # what identification needs; `require` checks others where they are used
 
 
@@ -66,6 +70,43 @@ def load_model(model: str | Path | ModuleType, *, folder: Path | None = None) ->
     return checked_model(module_of(path))
 
 
+@dataclass(frozen=True)
+class ModelText:
+    """An emitted module as text: what another process or machine is sent, and checks like any file given by path.
+
+    Attributes
+    ----------
+    name : str
+        File name.
+    text : str
+        What the file holds.
+    digest : str
+        SHA-256 of the text.
+    """
+
+    name: str
+    text: str
+    digest: str
+
+    @classmethod
+    def of(cls, model: GeneratedModel) -> ModelText:
+        """The text of the file that the model was loaded from; InputError for a model without one."""
+        path = getattr(model, "__file__", None)
+        if not path:
+            raise InputError("this model was not loaded from a file, which other processes need; use workers=0")
+        text = Path(path).read_text(encoding="utf-8")
+        return cls(Path(path).name, text, sha256(text.encode("utf-8")).hexdigest())
+
+    def load(self) -> GeneratedModel:
+        """The model; ModelError where the text is not the one that was sent, or not an emitted one."""
+        if sha256(self.text.encode("utf-8")).hexdigest() != self.digest:
+            raise ModelError(f"the text that arrived is not the one that was sent, SHA-256 {self.digest[:12]}", file=self.name)
+        with TemporaryDirectory(prefix="symgen-") as folder:
+            path = Path(folder) / self.name
+            path.write_text(self.text, encoding="utf-8")
+            return load_model(path)
+
+
 def checked_model(module: ModuleType) -> GeneratedModel:
     """The module itself if it is an emitted model with n, b and shapes that agree; ModelError otherwise."""
     label = module.__name__
@@ -105,6 +146,22 @@ def require(model: GeneratedModel, *functions: str) -> None:
     missing = [name for name in functions if not callable(getattr(model, name, None))]
     if missing:
         raise ModelError(f"no function {', '.join(missing)}; emit the model again with the target that has them", file=model.NAME)
+
+
+def joint_units(model: GeneratedModel) -> tuple[str, ...]:
+    """Unit of each joint position, "rad" or "m", in the order of JOINTS.
+
+    A joint slides where an element along it alone (friction, spring, motor inertia) has the unit of one that slides; without such elements, where no
+    moment of inertia acts on it, since a force depends on masses and first moments alone.
+    """
+    units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
+    result = []
+    for row, joint in enumerate(model.JOINTS):
+        acting = [name for k, name in enumerate(model.BASE_PARAMETERS) if model.STRUCTURE[k, row]]
+        own = {units.get(name, "") for name in acting if set(elements.get(name.removesuffix("R"), (0, 0, ()))[2]) == {joint}}
+        slides = bool(own & SLIDING) if own else not any(units.get(name) == "kg*m**2" for name in acting)
+        result.append("m" if slides else "rad")
+    return tuple(result)
 
 
 def _check_names(model: GeneratedModel, label: str) -> None:

@@ -1,6 +1,6 @@
 """A tool or load of known inertia on a link, or on a frame fixed to one (sigma 2): its ten parameters in either frame, and what it adds to X.
 
-With P the pseudo-inertia of a body (`runtime.estimators.physical`), about and along the axes of frame f, and lTf the pose of f in the frame of its link l,
+With P the pseudo-inertia of a body (`runtime.model.inertia`), about and along the axes of frame f, and lTf the pose of f in the frame of its link l,
 
     P_l = lTf P_f lTf',            hence chi_l = A(lTf) chi_f, A of shape (10, 10),
     X of the robot with the load = X + K_l chi_l,     K_l the columns of K = dX/dchi of link l.
@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.estimators.physical import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
 from runtime.model.generated import GeneratedModel, require
+from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
 
 Array = np.ndarray
 

@@ -18,7 +18,8 @@ import numpy as np
 from runtime.errors import SettingsError
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
-from runtime.settings.controller import Controller, Number
+from runtime.settings.controller import Controller
+from runtime.settings.schema import PerJoint
 
 Array = np.ndarray
 
@@ -78,7 +79,7 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
     """The numbers of the settings for the joints of a model; SettingsError where they do not fit."""
     n, law = len(model.JOINTS), controller.law
 
-    def each(path: str, value: Number | None, absent: float = 0.0) -> Array:
+    def each(path: str, value: PerJoint[float] | None, absent: float = 0.0) -> Array:
         x = np.atleast_1d(np.asarray(absent if value is None else value, dtype=float))
         if len(x) not in (1, n):
             raise SettingsError(
@@ -117,7 +118,7 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
     )
 
 
-def _saturation(controller: Controller, limits: Mapping[str, Any]) -> Number | None:
+def _saturation(controller: Controller, limits: Mapping[str, Any]) -> PerJoint[float] | None:
     given = controller.torque.saturation
     if given != "limits":
         return given

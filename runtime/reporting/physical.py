@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import io
 
-from runtime.estimators.estimate import Estimate, aligned
+from runtime.estimators.estimate import Estimate
 from runtime.markup import number
 from runtime.reporting.page import Section, Table
+from runtime.table import aligned
 
 
 def physical_section(fit: Estimate) -> Section:

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, panels_figure, svg
-from runtime.reporting.page import Image, Section, Table
-from runtime.resolution.advice import Advice, EncoderAdvice, counts
+from runtime.reporting.page import Image, Section
+from runtime.resolution.advice import Advice, EncoderAdvice
 
 COLUMNS = 5
 LOWEST, HIGHEST = 0.03, 300.0  # %, of the axes
@@ -58,39 +58,14 @@ def _panel(ax: Axes, found: EncoderAdvice, i: int, name: str) -> None:
 
 def advice_section(advice: Advice) -> Section:
     """Steps by encoder and by parameter, the figure, the assumptions."""
-    header = (
-        "encoder",
-        *(
-            h
-            for limit in advice.encoders[0].limits
-            for h in (f"{limit.percent:g} %: Delta, {advice.unit}", "", "first parameter", "sampled %e")
-        ),
-    )
-    rows = []
-    for encoder in advice.encoders:
-        cells = [encoder.label]
-        for limit in encoder.limits:
-            sampled = "-" if limit.sampled is None else f"{limit.error:.2f} ± {limit.half_width:.2f}"
-            cells += [f"{limit.delta:.3g}", counts(limit.delta) if advice.unit == "rad" else "", limit.parameter or "-", sampled]
-        rows.append(tuple(cells))
-    lines = advice.parameter_lines()
-    tables = [
-        Table(
-            "Coarsest step of each encoder, the others exact; sampled: %e of that parameter with the Student interval of the runs",
-            header,
-            rows,
-        ),
-        Table(
-            "All encoders alike, by parameter; * does not decide; last column: %sigma added by white motor torque noise of deviation 1",
-            lines[0],
-            lines[1:],
-        ),
-    ]
     image = Image(
         "%e against resolution: predicted curve and sampled points of every parameter that matters; dotted: 1 % and 5 %; grey: the steps advised",
         svg(advice_figure(advice)),
         "Change of every parameter in per cent against encoder resolution, predicted and sampled, logarithmic axes",
     )
     return Section(
-        "Resolution advice", (advice.verdict, *advice.asked_lines(), *advice.assumptions), [image] if advice.deciding else [], tables
+        "Resolution advice",
+        (advice.verdict, *advice.asked_lines(), *advice.assumptions),
+        [image] if advice.deciding else [],
+        [advice.step_table(), advice.parameter_table()],
     )

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from scipy.special import stdtrit
 
-from runtime.estimators.estimate import Estimate, aligned, json_text
+from runtime.estimators.estimate import Estimate, json_text
 from runtime.resolution.result import CONFIDENCE, DECIDING, Level, deciding_names
+from runtime.table import Table
 
 Array = np.ndarray
 
@@ -20,7 +21,17 @@ AGREED = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """CESTAC at one step: change of the mean of `runs` estimates in %, signed, and half width of its Student interval; shape (b,) each."""
+    """CESTAC at one step.
+
+    Attributes
+    ----------
+    delta : float, rad or m
+    runs : int
+    change : ndarray, shape (b,), %
+        Of the mean of the estimates, signed.
+    half_width : ndarray, shape (b,), %
+        Of its Student interval.
+    """
 
     delta: float
     runs: int
@@ -38,9 +49,19 @@ def sampled(delta: float, X: Array, reference: Array) -> Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """Where %e reaches `percent`: the step, rad or m, and the parameter that gets there first; inf and "" where none does.
+    """Step at which %e reaches `percent`, and the parameter that gets there first.
 
-    sampled : CESTAC at that step; None without runs.   error, half_width : %e it found for the parameter, and of its Student interval.
+    Attributes
+    ----------
+    percent : float, %
+    delta : float, rad or m
+        inf where no step does.
+    parameter : str
+        "" where no step does.
+    sampled : Sampled or None
+        CESTAC at that step; None without runs.
+    error, half_width : float, %
+        %e of the parameter in the runs, and half width of its Student interval.
     """
 
     percent: float
@@ -58,10 +79,22 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class EncoderAdvice:
-    """One choice of coarse encoders, the others exact.
+    """Advice on some encoders that are coarse, the others exact.
 
-    label : "all" or the joint.   limits : the coarsest steps.   delta : ndarray, shape (m,), steps of the curve.
-    change : ndarray, shape (m, b), predicted change of the estimate in %, signed.   sampled : CESTAC at some steps of the curve.
+    Attributes
+    ----------
+    label : str
+        "all", or the joint.
+    limits : tuple of Limit
+        The coarsest steps.
+    delta : ndarray, shape (m,), rad or m
+        Steps of the curve.
+    change : ndarray, shape (m, b), %
+        Predicted change of the estimate, signed.
+    sampled : tuple of Sampled
+        CESTAC at some steps of the curve.
+    unit : str
+        Of the steps: "rad", "m", or "rad or m" where encoders of both kinds are coarse.
     """
 
     label: str
@@ -69,6 +102,7 @@ class EncoderAdvice:
     delta: Array
     change: Array
     sampled: tuple[Sampled, ...] = ()
+    unit: str = "rad"
 
     def reached(self, percent: float) -> Array:
         """Step at which the |change| of every parameter first reaches `percent`, shape (b,); nan where it does not within the curve."""
@@ -79,8 +113,22 @@ class EncoderAdvice:
 class Advice:
     """Advice on the encoders of one robot, and on its torque sensors.
 
-    encoders : all together first, then one at a time.   steps : %e predicted at the steps that were asked for, all encoders, shape (len(asked), b).
-    torque_sigma : ndarray, shape (b,), deviation of the parameters per N m (N) of deviation of the motor torques.
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters, b of them.
+    reference : Estimate
+        From the record as measured.
+    encoders : tuple of EncoderAdvice
+        All together first, then one at a time.
+    asked : tuple of float, rad or m
+        Further steps, of all encoders.
+    steps : ndarray, shape (len(asked), b), %
+        Change predicted there.
+    torque_sigma : ndarray, shape (b,)
+        Deviation of the parameters per N m (N) of deviation of the motor torques.
+    assumptions : tuple of str
+    settings, provenance : mapping
     """
 
     names: tuple[str, ...]
@@ -100,8 +148,8 @@ class Advice:
 
     @property
     def unit(self) -> str:
-        """m where the robot's parameters are those of prismatic joints, else rad."""
-        return "m" if {self.reference.units.get(name, "") for name in self.names} & {"N*s/m", "kg"} else "rad"
+        """Unit of the first steps: "rad", "m", or "rad or m" where encoders of both kinds are coarse."""
+        return self.encoders[0].unit
 
     @property
     def place(self) -> str:
@@ -119,13 +167,14 @@ class Advice:
     def verdict(self) -> str:
         """The answer in words."""
         first = self.encoders[0]
-        parts = [self._sentence(limit, "With every encoder alike") for limit in first.limits]
+        parts = [self._sentence(limit, "With every encoder alike", first.unit) for limit in first.limits]
         single = self.encoders[1:]
-        if len(single) > 1:
-            hardest = min(single, key=lambda advice: advice.limits[0].delta)
+        for unit in dict.fromkeys(advice.unit for advice in single) if len(single) > 1 else ():
+            hardest = min((advice for advice in single if advice.unit == unit), key=lambda advice: advice.limits[0].delta)
+            limit, kind = hardest.limits[0], "" if unit == self.unit else f" in {unit}"
             parts.append(
-                f"Of single encoders, that of joint {hardest.label} asks most: {step_text(hardest.limits[0].delta, self.unit)} for "
-                f"{hardest.limits[0].percent:g} % ({hardest.limits[0].parameter or 'no parameter'})."
+                f"Of single encoders{kind}, that of joint {hardest.label} asks most: {step_text(limit.delta, unit)} for "
+                f"{limit.percent:g} % ({limit.parameter or 'no parameter'})."
             )
         doubted = [f"{advice.label} at {limit.percent:g} %" for advice in self.encoders for limit in advice.limits if not limit.agrees]
         if doubted:
@@ -133,10 +182,10 @@ class Advice:
         parts.append("Noise of the torques does not bias the estimate; it adds to sigma.")
         return " ".join(parts)
 
-    def _sentence(self, limit: Limit, who: str) -> str:
+    def _sentence(self, limit: Limit, who: str, unit: str) -> str:
         if not np.isfinite(limit.delta):
             return f"{who}, no step makes a parameter that matters change by {limit.percent:g} %."
-        text = f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = {step_text(limit.delta, self.unit)} {self.place} ({limit.parameter} first"
+        text = f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = {step_text(limit.delta, unit)} {self.place} ({limit.parameter} first"
         if limit.sampled is not None:
             text += f"; {limit.sampled.runs} runs there gave {limit.error:.2f} +- {limit.half_width:.2f} %"
         return text + ")."
@@ -146,40 +195,39 @@ class Advice:
 
     def to_table(self) -> str:
         """Steps by encoder, then by parameter, then what was assumed."""
-        lines: list[Sequence[str]] = [
-            (
-                "encoder",
-                *(
-                    h
-                    for limit in self.encoders[0].limits
-                    for h in (f"{limit.percent:g} %: Delta, {self.unit}", "", "parameter", "sampled %e")
-                ),
-            )
-        ]
-        for advice in self.encoders:
-            cells = [advice.label]
-            for limit in advice.limits:
-                sampled = "-" if limit.sampled is None else f"{limit.error:.2f} +- {limit.half_width:.2f}"
-                cells += [f"{limit.delta:.3g}", counts(limit.delta) if self.unit == "rad" else "", limit.parameter or "-", sampled]
-            lines.append(tuple(cells))
-        return "\n\n".join(
-            [aligned(lines), aligned(self.parameter_lines()), *self.asked_lines(), "\n".join(f"- {text}" for text in self.assumptions)]
-        )
+        tables = [table.to_text() for table in (self.step_table(), self.parameter_table())]
+        return "\n\n".join([*tables, *self.asked_lines(), "\n".join(f"- {text}" for text in self.assumptions)])
 
-    def parameter_lines(self) -> list[Sequence[str]]:
-        """Header and one line per parameter: %sigma, steps of all encoders at the limits, deviation per N m of torque noise in %."""
+    def step_table(self) -> Table:
+        """Coarsest steps by encoder."""
+        limits = self.encoders[0].limits
+        headers = (h for limit in limits for h in (f"{limit.percent:g} %: Delta, {self.unit}", "", "first parameter", "sampled %e"))
+        rows = []
+        for advice in self.encoders:
+            cells = [advice.label if advice.unit == self.unit else f"{advice.label}, {advice.unit}"]
+            for limit in advice.limits:
+                sampled = "-" if limit.sampled is None else f"{limit.error:.2f} ± {limit.half_width:.2f}"
+                cells += [f"{limit.delta:.3g}", counts(limit.delta) if advice.unit == "rad" else "", limit.parameter or "-", sampled]
+            rows.append(tuple(cells))
+        caption = "Coarsest step of each encoder, the others exact; sampled: %e of that parameter with the Student interval of the runs"
+        return Table(caption, ("encoder", *headers), rows)
+
+    def parameter_table(self) -> Table:
+        """By parameter: %sigma, steps of all encoders at the limits, deviation per N m (N) of torque noise in %."""
         first = self.encoders[0]
         reached = [first.reached(limit.percent) for limit in first.limits]
-        lines: list[Sequence[str]] = [
-            ("parameter", "%sigma", *(f"Delta at {limit.percent:g} %" for limit in first.limits), "% per unit torque deviation")
-        ]
+        header = ("parameter", "%sigma", *(f"Delta at {limit.percent:g} %" for limit in first.limits), "% per unit torque deviation")
         with np.errstate(divide="ignore", invalid="ignore"):
             added = 100 * self.torque_sigma / np.abs(self.reference.X)
+        rows = []
         for i, name in enumerate(self.names):
             mark = "" if name in self.deciding else " *"
             steps = (f"{step[i]:.3g}" if np.isfinite(step[i]) else "-" for step in reached)
-            lines.append((name + mark, f"{self.reference.relative_sigma[i]:.2f}", *steps, f"{added[i]:.3g}"))
-        return lines
+            rows.append((name + mark, f"{self.reference.relative_sigma[i]:.2f}", *steps, f"{added[i]:.3g}"))
+        caption = (
+            "All encoders alike, by parameter; * does not decide; last column: %sigma added by white motor torque noise of deviation 1"
+        )
+        return Table(caption, header, rows)
 
     def asked_lines(self) -> list[str]:
         """One line per step asked for."""
@@ -203,6 +251,7 @@ class Advice:
                 "encoders": [
                     {
                         "encoder": advice.label,
+                        "unit": advice.unit,
                         "limits": advice.limits,
                         "delta": advice.delta,
                         "change": advice.change,

@@ -22,23 +22,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial, reduce
+from operator import add
+from typing import Any, cast
 
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators import linear_system
-from runtime.estimators.essential import essential
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import assemble
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import observe, stack
+from runtime.model.generated import GeneratedModel, joint_units
+from runtime.observation.observation import stack
 from runtime.observation.position_errors import Normal, Perturbation, perturbation
 from runtime.records.record import Record
-from runtime.resolution.advice import Advice, EncoderAdvice, Limit, crossing
+from runtime.resolution.advice import Advice, EncoderAdvice, Limit, Sampled, crossing, sampled
+from runtime.resolution.perturbed import Task, prepared, study_columns, system_of
 from runtime.resolution.result import BIASED, DECIDING, NEGLIGIBLE, deciding_names
-from runtime.resolution.sampler import ALL, Sampler
+from runtime.resolution.rounding import rounded, stream
 from runtime.settings.study import Study, to_mapping
 
 Array = np.ndarray
@@ -52,6 +54,8 @@ RATIO = 1.3
 """Ratio of neighbouring steps of a curve."""
 WALK = 40
 """Steps tried below and above the first guess."""
+ALL = "all"
+"""Label of the advice on all encoders alike."""
 BELOW, ABOVE = 3, 9
 """Steps of the curve of all encoders below the first limit and above the last: factors of 2 and 10."""
 
@@ -77,7 +81,7 @@ class Predictor:
         """Change in % per Delta^2 at Delta = 0, shape (b,), columns that switch left out."""
         clean = self._total(0.0, ())
         X = clean.solve(self.weights)
-        added = _sum([part.smooth[i] for part in self.parts for i in encoders])
+        added = reduce(add, [part.smooth[i] for part in self.parts for i in encoders])
         moved = Normal(clean.G, added.g - added.G @ X).solve(self.weights)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(100 * self.share * moved / X)
@@ -86,13 +90,13 @@ class Predictor:
         return self._total(variance, encoders).solve(self.weights)
 
     def _total(self, variance: float, encoders: Sequence[int]) -> Normal:
-        return _sum([part.expected(variance, encoders) for part in self.parts])
+        return reduce(add, [part.expected(variance, encoders) for part in self.parts])
 
 
 def advise(
     model: GeneratedModel,
     records: Record | Sequence[Record],
-    study: Study,
+    study: Study | None = None,
     *,
     columns: Sequence[str] | None = None,
     asked: Sequence[float] = (),
@@ -103,16 +107,40 @@ def advise(
     progress: Progress | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Advice:
-    """Advice by the settings of `study`: side, rounding, columns and runs are those of study.cestac.
+    """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted; side, rounding, columns and runs by study.cestac.
 
-    columns : essential names where they are known; default: by study.cestac.columns.   asked : steps whose %e is predicted besides.
-    encoders : "all" and numbers of joints whose encoder alone is coarse; default: "all", then every one.
-    confirm : sample at the steps found, study.cestac.runs times each.   progress : called with the number of choices of encoders done and their total.
-    Raises SettingsError for a method that is not linear least squares and for a median filter, which no prediction goes through.
+    Parameters
+    ----------
+    model : GeneratedModel
+    records : Record or sequence of Record
+    study : Study, optional
+        Default: Study().
+    columns : sequence of str, optional
+        Essential names where they are known; default: by study.cestac.columns.
+    asked : sequence of float, rad or m
+        Further steps whose change is predicted.
+    encoders : sequence of str, optional
+        "all" and numbers of joints whose encoder alone is coarse; default: "all", then every one.
+    drives : Drives, optional
+        Motor side; default: DRIVES of the model.
+    constants : mapping, optional
+        Values in place of the robot file's.
+    confirm : bool
+        Sample at the steps of the limits, study.cestac.runs times each.
+    progress : callable, optional
+        Called with the number of choices of encoders done and their total.
+    provenance : mapping, optional
+        Further entries of Advice.provenance.
+
+    Raises
+    ------
+    SettingsError
+        A method that is not linear least squares, or a median filter, which no prediction goes through.
     """
+    study = study or Study()
     records = (records,) if isinstance(records, Record) else tuple(records)
     _refuse(study)
-    names = _columns(model, records, study, columns, constants)
+    names = study_columns(model, records, study, columns, constants)
     parts = tuple(perturbation(model, record, study, names, drives=drives, constants=constants) for record in records)
     settings = replace(study.estimate, columns="all")
     seen = stack([part.seen for part in parts]) if len(parts) > 1 else parts[0].seen
@@ -120,20 +148,27 @@ def advise(
     reference = assemble(system, system.solve(), model=model, provenance=provenance)
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[study.cestac.rounding])
     decisive = [names.index(name) for name in deciding_names(reference)]
-    choices = _choices(model, encoders)
-    sampler = Sampler(model, records, parts, study.cestac, settings, dict(constants or {}), reference)
+    every = range(len(model.JOINTS))
+    task = Task(
+        tuple(prepared(record, study) for record in records), model, names, settings, study.cestac, (), drives, dict(constants or {})
+    )
+    units = joint_units(model) if study.cestac.side == "joint" else ("rad",) * len(model.JOINTS)  # motors turn
+    selections = _selections(model, encoders)
     advices = []
-    for label, chosen in choices.items():
-        found = _advice(predictor, label, chosen, names, decisive)
-        advices.append(sampler.confirmed(found, chosen) if confirm else found)
+    for label, own in selections.items():
+        unit = _unit([units[i] for i in own])
+        advice = _advice(predictor, label, own, names, decisive, unit)
+        if confirm:
+            advice = confirmed(advice, reference, partial(sampled_level, task, parts, reference, own))
+        advices.append(advice)
         if progress is not None:
-            progress(len(advices), len(choices))
+            progress(len(advices), len(selections))
     return Advice(
         names=names,
         reference=reference,
         encoders=tuple(advices),
         asked=tuple(asked),
-        steps=np.array([predictor.change(delta, range(len(model.JOINTS))) for delta in asked]).reshape(len(asked), len(names)),
+        steps=np.array([predictor.change(delta, every) for delta in asked]).reshape(len(asked), len(names)),
         torque_sigma=torque_sigma(predictor, drives or _drives(model)),
         assumptions=assumptions(study, records, parts, reference),
         settings={
@@ -146,7 +181,11 @@ def advise(
     )
 
 
-def _choices(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
+def _unit(units: Sequence[str]) -> str:
+    return " or ".join(sorted(set(units), reverse=True))
+
+
+def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
     """Coarse encoders (from 0) by label."""
     n = len(model.JOINTS)
     every = {ALL: tuple(range(n)), **{str(joint): (i,) for i, joint in enumerate(model.JOINTS)}}
@@ -157,11 +196,15 @@ def _choices(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, t
     return {label: every[label] for label in labels}
 
 
-def _advice(predictor: Predictor, label: str, encoders: Sequence[int], names: Sequence[str], decisive: Sequence[int]) -> EncoderAdvice:
+def _advice(
+    predictor: Predictor, label: str, encoders: Sequence[int], names: Sequence[str], decisive: Sequence[int], unit: str
+) -> EncoderAdvice:
     """Limits by a walk on steps in geometric progression; the curve of all encoders goes on beyond them."""
     rate = np.abs(predictor.rate(encoders)[decisive]).max(initial=0.0)
     if not (np.isfinite(rate) and rate > 0):
-        return EncoderAdvice(label, tuple(Limit(percent, np.inf, "") for percent in LIMITS), np.empty(0), np.empty((0, len(names))))
+        return EncoderAdvice(
+            label, tuple(Limit(percent, np.inf, "") for percent in LIMITS), np.empty(0), np.empty((0, len(names))), unit=unit
+        )
     start = float(np.sqrt(LIMITS[0] / rate))
     known: dict[int, Array] = {}
 
@@ -183,7 +226,50 @@ def _advice(predictor: Predictor, label: str, encoders: Sequence[int], names: Se
         steps = [crossing(delta, np.abs(change[:, i]), percent) for i in decisive]
         first = int(np.nanargmin(steps)) if np.isfinite(steps).any() else None
         limits.append(Limit(percent, np.inf, "") if first is None else Limit(percent, steps[first], names[decisive[first]]))
-    return EncoderAdvice(label, tuple(limits), delta, change)
+    return EncoderAdvice(label, tuple(limits), delta, change, unit=unit)
+
+
+def sampled_level(
+    task: Task, parts: Sequence[Perturbation], reference: Estimate, encoders: Sequence[int], delta: float, runs: int | None = None
+) -> Sampled:
+    """CESTAC with only some encoders coarse, eqs. (17), (18), (21); the streams of an encoder do not depend on which others are coarse.
+
+    encoders : numbers from 0.   runs : default: as many as the settings say.
+    """
+    X = []
+    for run in range(runs or task.settings.runs):
+        positions = [_coarse(task, part, k, delta, encoders, run) for k, part in enumerate(parts)]
+        system = linear_system(
+            system_of(cast(GeneratedModel, task.model), task, positions, [record.torque for record in task.records]), task.estimate
+        )
+        X.append(system.solve().X)
+    return sampled(delta, np.array(X), reference.X)
+
+
+def _coarse(task: Task, part: Perturbation, k: int, delta: float, encoders: Sequence[int], run: int) -> Array:
+    """Positions of record k, shape (N, n), with some encoders rounded."""
+    settings, q = task.settings, task.records[k].q
+    own = np.linalg.solve(part.root, q.T).T  # positions as the encoders see them, up to their offsets
+    error = np.zeros_like(own)
+    for i in encoders:
+        error[:, i] = rounded(own[:, i], delta, settings.rounding, stream(settings.seed, k, run, i)) - own[:, i]
+    return np.asarray(q + error @ part.root.T)
+
+
+def confirmed(advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]) -> EncoderAdvice:
+    """The advice with runs at the steps of its limits; of all encoders, also between and above them."""
+    made = {limit.delta: level(limit.delta) for limit in advice.limits if np.isfinite(limit.delta)}
+    limits = []
+    for limit in advice.limits:
+        if limit.delta in made:
+            point, i = made[limit.delta], reference.names.index(limit.parameter)
+            limit = replace(limit, sampled=point, error=abs(float(point.change[i])), half_width=float(point.half_width[i]))
+        limits.append(limit)
+    if advice.label == ALL and made:
+        low, high = min(made), max(made)
+        for delta in (np.sqrt(low * high), 2 * high, 5 * high):
+            made[float(delta)] = level(float(delta))
+    return replace(advice, limits=tuple(limits), sampled=tuple(made[delta] for delta in sorted(made)))
 
 
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
@@ -243,30 +329,5 @@ def _refuse(study: Study) -> None:
         raise SettingsError("'covariance'; the prediction knows weights by joint, use joint or iterated", path=("estimate", "weights"))
 
 
-def _columns(
-    model: GeneratedModel, records: Sequence[Record], study: Study, columns: Sequence[str] | None, constants: Mapping[str, float] | None
-) -> tuple[str, ...]:
-    """Names of the columns: a list, all, or the essential ones of the identification that `study` describes."""
-    wanted = study.cestac.columns
-    if wanted == "all":
-        return tuple(model.BASE_PARAMETERS)
-    if wanted != "essential":
-        return wanted
-    if columns is not None:
-        return tuple(columns)
-    observations = [observe(model, record, study, constants=constants) for record in records]
-    return essential(stack(observations), study.essential, study.estimate).names
-
-
 def _drives(model: GeneratedModel) -> Drives | None:
     return None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
-
-
-def _sum(parts: Sequence[Normal]) -> Normal:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total
-
-
-__all__ = ["Predictor", "Sampler", "advise", "assumptions", "torque_sigma"]

@@ -4,8 +4,8 @@
     W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC), through the filters of the identification          eq. (16)
     X_CESTAC = least squares of Y on W_CESTAC, Y as measured                                         eq. (17)
 
-N runs per Delta (`runtime.resolution.run`) give the mean (18), the deviation (19), %sigma (20), %e (21) and the residual (22); `runtime.resolution.result` holds and judges
-them. The rows used are those of the measured record in every run. Steps of the motor torque (`torque`, section 4.1.3) are studied alone and
+N runs per Delta (`runtime.resolution.run`) give the mean (18), the deviation (19), %sigma (20), %e (21) and the residual (22); `runtime.resolution.result` holds them
+and their verdict. The rows used are those of the measured record in every run. Steps of the motor torque (`torque`, section 4.1.3) are studied alone and
 with the first Delta. Columns are by default the essential ones of the identification, rounding is two-point, on the joint side: those
 reproduce the chapter's figures.
 
@@ -16,36 +16,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from hashlib import sha256
 from itertools import groupby
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from runtime import distributed
 from runtime.errors import InputError, SettingsError
 from runtime.estimators import linear_system
-from runtime.estimators.essential import essential
 from runtime.estimators.linear import assemble
 from runtime.model.compile_cache import processor
-from runtime.model.compiled import CompiledModel, target_of
+from runtime.model.compiled import target_of, text_of
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
-from runtime.model.text import ModelText
-from runtime.observation.filters import filtered_states
-from runtime.observation.observation import decimated_torque, observe, select_rows, stack
 from runtime.parallel import results
 from runtime.records.record import Record
-from runtime.resolution.c import cestac_run as fused_cestac
+from runtime.resolution.c.workspace import usable
 from runtime.resolution.checkpoint import Checkpoint
-from runtime.resolution.device import Device
-from runtime.resolution.result import Cestac, Level, level_result
-from runtime.resolution.run import Part, Task, forget, observed, run_block
-from runtime.resolution.runs import Runs
+from runtime.resolution.perturbed import Task, perturbed, prepared, study_columns
+from runtime.resolution.result import Cestac, Level, Runs, level_result
+from runtime.resolution.run import forget, run_block
 from runtime.settings.study import CestacSettings, Study, to_mapping
 
-Array = np.ndarray
 Progress = Callable[[int, int], None]
 Key = tuple[int, int]
 
@@ -56,72 +49,88 @@ BLOCK = 20
 def cestac(
     model: GeneratedModel,
     records: Record | Sequence[Record],
-    study: Study,
+    study: Study | None = None,
     *,
     columns: Sequence[str] | None = None,
     drives: Drives | None = None,
     constants: Mapping[str, float] | None = None,
     workers: int = 0,
     scheduler: str | None = None,
-    device: Device | None = None,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Cestac:
-    """Resolution study by the settings study.cestac.
+    """Change of the least-squares estimate under coarser encoders and torque sensors, by the settings study.cestac.
 
     Parameters
     ----------
-    records : one record of the robot, or several that are stacked.
-    columns : essential names where they are known; default: those of `study` on these records. Unused unless study.cestac.columns is "essential".
-    drives : motor side; default: DRIVES of the model.
-    constants : values in place of the robot file's.
-    workers : processes, 0 for this one (`runtime.parallel`); the results do not depend on it. A script that asks for processes needs the usual
+    model : GeneratedModel
+        Emitted module, or the same in C (`runtime.model.compiled`).
+    records : Record or sequence of Record
+        One record of the robot, or several that are stacked.
+    study : Study, optional
+        Default: Study().
+    columns : sequence of str, optional
+        Essential names where they are known; default: those of `study` on these records. Unused unless study.cestac.columns is "essential".
+    drives : Drives, optional
+        Motor side; default: DRIVES of the model.
+    constants : mapping, optional
+        Values in place of the robot file's.
+    workers : int
+        Processes, 0 for this one (`runtime.parallel`); the results do not depend on it. A script that asks for processes needs the usual
         `if __name__ == "__main__"`.
-    scheduler : address of a Dask cluster that works instead (`runtime.distributed`), with the same results.
-    device : arrays that work instead, in this process (`runtime.resolution.device`), with the same results to rounding.
-    progress : called with the number of runs done and their total.
-    checkpoint : where runs are kept while the study lasts; those of an interrupted or shorter study with the same settings are not repeated.
+    scheduler : str, optional
+        Address of a Dask cluster that works instead (`runtime.distributed`), with the same results.
+    progress : callable, optional
+        Called with the number of runs done and their total.
+    checkpoint : Checkpoint, optional
+        Where runs are kept while the study lasts; those of an interrupted or shorter study with the same settings are not repeated.
+    provenance : mapping, optional
+        Further entries of Cestac.provenance.
+
+    Raises
+    ------
+    SettingsError
+        Motor side without drives, or a column that is no base parameter.
+    InputError
+        Both workers and a scheduler.
     """
-    settings, model = study.cestac, fused_cestac.usable(model)
+    study = study or Study()
+    settings, model = study.cestac, usable(model)
     records = (records,) if isinstance(records, Record) else tuple(records)
     drives = Drives.from_mapping(model.DRIVES) if drives is None and model.DRIVES is not None else drives
     if settings.side == "motor" and drives is None:
         raise SettingsError(
             f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("cestac", "side")
         )
-    if device is not None and (workers or scheduler):
-        raise InputError("a device works in this process; leave out workers and scheduler")
     if scheduler and workers:
         raise InputError("a scheduler has workers of its own; leave out workers")
-    names = _columns(model, records, study, columns, constants)
     task = Task(
-        parts=tuple(_part(record, study) for record in records),
+        records=tuple(prepared(record, study) for record in records),
         model=model,
-        names=names,
+        names=study_columns(model, records, study, columns, constants),
         estimate=replace(study.estimate, columns="all"),
         settings=settings,
         levels=levels_of(settings),
         drives=drives,
         constants=dict(constants or {}),
     )
-    seen = observed(task, model, Level(0.0), ())
-    system = linear_system(seen, task.estimate)
+    measured = perturbed(model, task, Level(0.0), ())
+    system = linear_system(measured, task.estimate)
     reference = assemble(system, system.solve(), model=model, provenance=provenance)
     described = {
-        **seen.settings,
+        **measured.settings,
         "estimate": to_mapping(study.estimate),
         "cestac": to_mapping(settings),
         "rate": [record.rate for record in records],
-        "target": device.name if device else target_of(model),
+        "target": target_of(model),
         "torque_side": "joint" if drives is None else "motor",
     }
-    finished = checkpoint.resume(_identity(task, described, reference.provenance), len(names)) if checkpoint else Runs.of((), len(names))
-    runs = _all_runs(task, finished, partial(_results, task, workers, scheduler, device), progress, checkpoint)
+    runs = _all_runs(task, _identity(task, described, reference.provenance), workers, scheduler, progress, checkpoint)
     return Cestac(
-        names=names,
+        names=task.names,
         reference=reference,
-        levels=tuple(level_result(level, runs.where(runs.level == k), seen, reference) for k, level in enumerate(task.levels)),
+        levels=tuple(level_result(level, runs.where(runs.level == k), measured, reference) for k, level in enumerate(task.levels)),
         settings=described,
         provenance={**reference.provenance, "seed": settings.seed, "processor": processor()},
     )
@@ -148,19 +157,20 @@ def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> lis
 
 def _all_runs(
     task: Task,
-    finished: Runs,
-    compute: Callable[[Sequence[tuple[Key, ...]]], Iterator[Runs]],
+    identity: Mapping[str, Any],
+    workers: int,
+    scheduler: str | None,
     progress: Progress | None,
     checkpoint: Checkpoint | None,
 ) -> Runs:
-    """Every run, by level and number, in whatever order they finished."""
-    runs, b = task.settings.runs, len(task.names)
-    parts = [finished.where((finished.level < len(task.levels)) & (finished.run < runs))]
-    done, total = len(parts[0]), runs * len(task.levels)
-    known = parts[0].keys
-    missing = [key for level in range(len(task.levels)) for run in range(runs) if (key := (level, run)) not in known]
+    """Every run, by level and number, in whatever order they finished. identity : what tells this study from others on disk."""
+    runs, levels, b = task.settings.runs, range(len(task.levels)), len(task.names)
+    finished = checkpoint.resume(identity, b) if checkpoint else Runs.of((), b)
+    parts = [finished.where((finished.level < len(levels)) & (finished.run < runs))]
+    done, total, known = len(parts[0]), runs * len(levels), parts[0].keys
+    missing = [key for level in levels for run in range(runs) if (key := (level, run)) not in known]
     try:
-        for part in compute(key_blocks(missing, runs, len(task.levels), task.settings.common)):
+        for part in _results(task, key_blocks(missing, runs, len(levels), task.settings.common), workers, scheduler):
             parts.append(part)
             done += len(part)
             if checkpoint is not None:
@@ -169,23 +179,17 @@ def _all_runs(
                 progress(done, total)
     finally:  # also when Ctrl-C or an error ends the study
         forget()
-        fused_cestac.forget()
         if checkpoint is not None:
             checkpoint.flush()
     return Runs.joined(parts, b)
 
 
-def _results(task: Task, workers: int, scheduler: str | None, device: Device | None, blocks: Sequence[tuple[Key, ...]]) -> Iterator[Runs]:
-    """Blocks of runs, from this process, several, a cluster or a device."""
-    if device is not None:
-        return device(task, blocks)
-    in_c = isinstance(task.model, CompiledModel)
-    run = fused_cestac.run_block if in_c else run_block
+def _results(task: Task, blocks: Sequence[tuple[Key, ...]], workers: int, scheduler: str | None) -> Iterator[Runs]:
+    """Blocks of runs, from this process, several, or a cluster."""
     if not blocks or not (workers or scheduler):
-        return results(run, task, blocks)
-    text = fused_cestac.CompiledText if in_c else ModelText
-    sent = replace(task, model=task.model if isinstance(task.model, ModelText) else text.of(task.model))
-    return distributed.results(run, sent, blocks, scheduler) if scheduler else results(run, sent, blocks, workers)
+        return results(run_block, task, blocks)
+    sent = replace(task, model=text_of(cast(GeneratedModel, task.model)))
+    return distributed.results(run_block, sent, blocks, scheduler) if scheduler else results(run_block, sent, blocks, workers)
 
 
 def _identity(task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -201,34 +205,6 @@ def _identity(task: Task, described: Mapping[str, Any], provenance: Mapping[str,
         else [drives.ratio.tolist(), drives.offset.tolist(), drives.torque_constant.tolist(), drives.coupling],
         "robot": provenance.get("robot"),
         "robot_sha256": provenance.get("robot_sha256"),
-        "records": [
-            sha256(np.ascontiguousarray(part.q).tobytes() + np.ascontiguousarray(part.tau).tobytes()).hexdigest() for part in task.parts
-        ],
+        "records": [sha256(np.ascontiguousarray(r.q).tobytes() + np.ascontiguousarray(r.tau).tobytes()).hexdigest() for r in task.records],
         "versions": provenance["versions"],
     }
-
-
-def _part(record: Record, study: Study) -> Part:
-    """Rows and torques of the measured record, through the filters of the study."""
-    signals = replace(study.signals, median=study.cestac.median)
-    selection = select_rows(record, filtered_states(record.q, record.rate, signals).qd, signals, study.rows)
-    return Part(record.q, record.tau, record.rate, dict(record.files), selection, decimated_torque(record.tau, selection))
-
-
-def _columns(
-    model: GeneratedModel, records: Sequence[Record], study: Study, columns: Sequence[str] | None, constants: Mapping[str, float] | None
-) -> tuple[str, ...]:
-    """Names of the columns: a list, all, or the essential ones of the identification that `study` describes."""
-    wanted = study.cestac.columns
-    if wanted == "essential":
-        if columns is None:
-            observations = [observe(model, record, study, constants=constants) for record in records]
-            return essential(stack(observations), study.essential, study.estimate).names
-        wanted = tuple(columns)
-    elif wanted == "all":
-        wanted = tuple(model.BASE_PARAMETERS)
-    unknown = [name for name in wanted if name not in model.BASE_PARAMETERS]
-    if unknown:
-        message = f"no parameter {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}"
-        raise SettingsError(message, path=("cestac", "columns"))
-    return wanted

@@ -20,7 +20,7 @@ is large do not decide; the result says which ones did. Section 4.1.4 calls the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
@@ -28,11 +28,11 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from runtime.estimators.estimate import Estimate, aligned, json_text
+from runtime.estimators.estimate import Estimate, json_text
 from runtime.latex import error_table, level_table
+from runtime.markup import Markup, number
 from runtime.observation.observation import Observation
-from runtime.reporting.notebook import cestac_html
-from runtime.resolution.runs import Runs
+from runtime.table import Table, aligned, notebook
 
 Array = np.ndarray
 
@@ -50,6 +50,77 @@ LISTED = 1000
 """Largest number of runs that the JSON text lists; beyond, they are in the archives of the checkpoint (`runtime.resolution.checkpoint`)."""
 MOST_RUNS = 100_000
 """Largest number of runs that `runs_needed` answers."""
+NORMAL, TRIANGULAR = "normal equations", "triangular factor"
+"""How the least squares of a run was solved."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run: parameters in column order, ||Y - W_CESTAC X|| in N m, and how the least squares was solved (NORMAL or TRIANGULAR)."""
+
+    level: int
+    run: int
+    X: tuple[float, ...]
+    residual_norm: float
+    method: str = TRIANGULAR
+
+
+@dataclass(frozen=True, eq=False)
+class Runs(Sequence[Run]):
+    """R runs as arrays, which is what travels between processes and lies on disk.
+
+    Attributes
+    ----------
+    level, run : ndarray of int, shape (R,)
+    X : ndarray, shape (R, b)
+    residual_norm : ndarray, shape (R,), N m
+    normal : ndarray of bool, shape (R,)
+        Whether the run was solved by normal equations.
+    """
+
+    level: Array
+    run: Array
+    X: Array
+    residual_norm: Array
+    normal: Array
+
+    @classmethod
+    def of(cls, runs: Sequence[Run], b: int) -> Runs:
+        """Runs with b parameters each."""
+        return cls(
+            np.array([run.level for run in runs], dtype=np.int64),
+            np.array([run.run for run in runs], dtype=np.int64),
+            np.array([run.X for run in runs], dtype=float).reshape(len(runs), b),
+            np.array([run.residual_norm for run in runs], dtype=float),
+            np.array([run.method == NORMAL for run in runs], dtype=bool),
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Runs], b: int) -> Runs:
+        """All runs of the parts, by level and number; of a run that comes twice, the first."""
+        parts = [cls.of((), b), *parts]
+        fields = [np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__]
+        _, first = np.unique(np.stack(fields[:2]), axis=1, return_index=True)
+        return cls(*(field[first] for field in fields))
+
+    def where(self, selected: Array) -> Runs:
+        """The selected runs; bool of shape (R,), or numbers."""
+        return Runs(*(getattr(self, name)[selected] for name in self.__dataclass_fields__))
+
+    @property
+    def keys(self) -> set[tuple[int, int]]:
+        """(level, run) of every run."""
+        return set(zip(self.level.tolist(), self.run.tolist(), strict=True))
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+    def __getitem__(self, i: int) -> Run:  # type: ignore[override]
+        method = NORMAL if self.normal[i] else TRIANGULAR
+        return Run(int(self.level[i]), int(self.run[i]), tuple(self.X[i].tolist()), float(self.residual_norm[i]), method)
+
+    def __iter__(self) -> Iterator[Run]:
+        return (self[i] for i in range(len(self)))
 
 
 @dataclass(frozen=True)
@@ -156,7 +227,15 @@ class Cestac:
         return aligned(lines)
 
     def _repr_html_(self) -> str:
-        return cestac_html(self)
+        labels = [r.level.label for r in self.levels]
+        rows = [
+            (name, number(self.reference.X[i]), *(f"{number(r.mean[i])} ({number(r.e[i], '.2f')} %)" for r in self.levels))
+            for i, name in enumerate(self.names)
+        ]
+        rows.append((Markup("%e(ρ)"), "", *(f"{number(r.e_rho, '.2f')} %" for r in self.levels)))
+        rows.append((Markup("verdict"), "", *(r.verdict for r in self.levels)))
+        table = Table("Resolution study", ("parameter", "least squares", *labels), rows, symbols=True)
+        return notebook([f"Resolution study: mean of the runs and, in brackets, %e (21); {self.verdict}"], table)
 
     def _repr_latex_(self) -> str:
         return self.to_latex()

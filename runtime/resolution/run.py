@@ -1,159 +1,84 @@
 """One run of a resolution study, from perturbed positions to the least squares of Y on W_CESTAC, eqs. (15)-(17).
 
-What does not change from run to run is made once in each process and kept in a Workspace: Y, filtered positions of the record, the plan of the
-decimation, the distinct signals of the regressor and where they stand, and room for all of them. A run on 60 columns is then 11 times faster than the
-plain way (filter, dense regressor, scipy's decimate column by column, lstsq), on 26 columns 8 times: `benchmarks/cestac_run.py`.
+What does not change from run to run is made once in each thread and kept in a workspace: Y, filtered positions of the record, the plan of the
+decimation, the distinct signals of the regressor and where they stand, and room for all of them. A compiled model has a workspace of its own
+(`runtime.resolution.c.workspace`). Times: docs/performance.md, `benchmarks/cestac_run.py`.
 
 Filters are linear, their padding too: filter(q + Delta xi) = filter(q) + Delta filter(xi). With common random numbers xi is the same for every Delta and
 is filtered once; the median filter and true quantisation are not linear and take the whole way. Least squares by the normal equations of each joint
 and one refinement (`runtime.estimators.normal_equations`) while the condition allows it, else by the triangular factor; every run says which.
-
-Runs are not stacked into longer arrays: a run of 2500 samples costs 1.4 times as much per sample as one of 45000, which is all there is to save, and
-longer arrays leave the cache.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 from runtime.errors import InputError
 from runtime.estimators import linear_system
-from runtime.estimators.normal_equations import least_squares
-from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel
-from runtime.model.text import ModelText
+from runtime.estimators.normal_equations import LeastSquares, least_squares
+from runtime.model.compiled import CompiledModel
+from runtime.model.generated import GeneratedModel, ModelText
 from runtime.observation.filters import States, decimation_plan, filtered_states
-from runtime.observation.observation import Observation, Selection, decimated_torque, observation_from_states, stack
 from runtime.observation.regressor_signals import DecimatedSignals, distinct_entries
-from runtime.resolution.result import Level
-from runtime.resolution.rounding import ADDED, noise, rounded, stream
-from runtime.resolution.runs import TRIANGULAR, Run, Runs
-from runtime.settings.study import CestacSettings, EstimateSettings
+from runtime.resolution.c.workspace import CompiledWorkspace
+from runtime.resolution.perturbed import PreparedRecord, Task, perturbed, perturbed_position, stream_keys, torque_rows
+from runtime.resolution.result import TRIANGULAR, Level, Run, Runs
+from runtime.resolution.rounding import ADDED, noise, stream
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One record, with what does not change from run to run.
-
-    q, tau : ndarray, shape (N, n), as measured, joint side.   selection : rows used, those of the measured record.
-    torque : ndarray, shape (n, K), Y before rows are left out.
-    """
-
-    q: Array
-    tau: Array
-    rate: float
-    files: Mapping[str, str]
-    selection: Selection
-    torque: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Task:
-    """What every run needs; travels once to each process. `model` is the module, or its text for another process."""
-
-    parts: tuple[Part, ...]
-    model: GeneratedModel | ModelText
-    names: tuple[str, ...]
-    estimate: EstimateSettings
-    settings: CestacSettings
-    levels: tuple[Level, ...]
-    drives: Drives | None
-    constants: Mapping[str, float]
+def run_block(task: Task, keys: Sequence[tuple[int, int]]) -> Runs:
+    """Several runs, one after the other; key = (level, run)."""
+    return Runs.of([one_run(task, key) for key in keys], len(task.names))
 
 
 def one_run(task: Task, key: tuple[int, int]) -> Run:
-    """One estimate from perturbed measurements; key = (level, run)."""
+    """One estimate from perturbed measurements; key = (level, run). Estimators other than ordinary least squares take the way of the identification."""
     number, run = key
     level, work = task.levels[number], workspace(task)
     draw = (run,) if task.settings.common else (number, run)
     if task.estimate.method != "ols" or task.estimate.options:
-        system = linear_system(observed(task, work.model, level, draw), task.estimate)
+        system = linear_system(perturbed(work.model, task, level, draw), task.estimate)
         X = system.solve().X
         norms, method = np.array([joint.residual_norm(X) for joint in system.raw.joints]), TRIANGULAR
     else:
-        rows = [part.rows(level, part_key(draw, k)) for k, part in enumerate(work.parts)]
-        fit = least_squares(lambda: rows, work.columns, len(task.names))
+        fit = work.fit(level, draw)
         X, norms, method = fit.X, fit.residual_norms, fit.method
     return Run(number, run, tuple(X.tolist()), float(np.linalg.norm(norms)), method)
 
 
-def run_block(task: Task, keys: Sequence[tuple[int, int]]) -> Runs:
-    """Several runs, one after the other."""
-    return Runs.of([one_run(task, key) for key in keys], len(task.names))
+class NumpyWorkspace:
+    """The workspace of an emitted module."""
+
+    def __init__(self, task: Task, model: GeneratedModel) -> None:
+        self.task, self.model = task, model
+        numbers = np.array([model.BASE_PARAMETERS.index(name) for name in task.names], dtype=int)
+        self.entries = distinct_entries(model, task.constants, numbers)
+        self.by_joint = [np.flatnonzero(self.entries.j == j) for j in range(len(model.JOINTS))]
+        self.columns = [self.entries.row[own] for own in self.by_joint]
+        self.records = [RecordWorkspace(self, record) for record in task.records]
+
+    def fit(self, level: Level, draw: tuple[int, ...]) -> LeastSquares:
+        """Ordinary least squares of Y on W_CESTAC of one draw, eq. (17)."""
+        rows = [record.rows(level, stream_keys(draw, k)) for k, record in enumerate(self.records)]
+        return least_squares(lambda: rows, self.columns, len(self.task.names))
 
 
-def perturbed_position(q: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]) -> Array:
-    """q_CESTAC of eqs. (15), (28), shape (N, n), from the measured q; `key` of its random stream."""
-    if not level.delta:
-        return q
-    rng = stream(settings.seed, *key)
-    if settings.side == "joint" or drives is None:
-        return rounded(q, level.delta, settings.rounding, rng)
-    return drives.joint_position(rounded(drives.motor_position(q), level.delta, settings.rounding, rng))
-
-
-def perturbed_torque(tau: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]) -> Array:
-    """Joint torques, shape (N, n), with motor torques (N m) rounded in steps of Phi; joint torques where there are no drives."""
-    rng = stream(settings.seed, *key)
-    if drives is None:
-        return rounded(tau, level.torque, settings.rounding, rng)
-    motor = drives.motor_command(tau) * drives.torque_constant
-    return drives.joint_torque(rounded(motor, level.torque, settings.rounding, rng) / drives.torque_constant)
-
-
-def observed(task: Task, model: GeneratedModel, level: Level, draw: tuple[int, ...]) -> Observation:
-    """The system with perturbed measurements, by the way of the identification."""
-    observations = []
-    for k, part in enumerate(task.parts):
-        key = part_key(draw, k)
-        states = filtered_states(perturbed_position(part.q, level, task.settings, task.drives, key[0]), part.rate, part.selection.signals)
-        torque = part.torque
-        if level.torque:
-            torque = decimated_torque(perturbed_torque(part.tau, level, task.settings, task.drives, key[1]), part.selection)
-        observations.append(
-            observation_from_states(model, states, torque, part.selection, files=part.files, columns=task.names, constants=task.constants)
-        )
-    return observations[0] if len(observations) == 1 else stack(observations)
-
-
-def part_key(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Streams of the positions and of the torques of record k: (*draw, 2 k) and (*draw, 2 k + 1), positions of record 0 `draw` itself.
-
-    A draw is the same with and without torques, and whatever records follow.
-    """
-    return ((*draw, 2 * k) if k else draw), (*draw, 2 * k + 1)
-
-
-class Workspace:
-    """What one thread keeps from run to run."""
-
-    def __init__(self, task: Task) -> None:
-        self.task = task
-        self.model = task.model.load() if isinstance(task.model, ModelText) else task.model
-        numbers = np.array([self.model.BASE_PARAMETERS.index(name) for name in task.names], dtype=int)
-        self.entries = distinct_entries(self.model, task.constants, numbers)
-        self.by_joint = [np.flatnonzero(self.entries.j == j) for j in range(len(self.model.JOINTS))]
-        self.columns = [self.entries.row[chosen] for chosen in self.by_joint]
-        self.parts = [PartWorkspace(self, part) for part in task.parts]
-
-
-class PartWorkspace:
+class RecordWorkspace:
     """The same for one record."""
 
-    def __init__(self, work: Workspace, part: Part) -> None:
-        self.work, self.part, self.selection = work, part, part.selection
-        task, samples = work.task, part.selection.samples
+    def __init__(self, work: NumpyWorkspace, record: PreparedRecord) -> None:
+        self.work, self.record, self.selection = work, record, record.selection
+        task, samples = work.task, record.selection.samples
         plan = decimation_plan(samples.stop - samples.start, self.selection.factor, self.selection.signals.decimate)
         self.signals = DecimatedSignals(work.model, work.entries, task.constants, plan)
-        self.q = np.asfortranarray(part.q)
+        self.q = np.asfortranarray(record.q)
         self.kept = [np.flatnonzero(mask) for mask in self.selection.mask]
-        self.filtered = filtered_states(self.q, part.rate, self.selection.signals)
+        self.filtered = filtered_states(self.q, record.rate, self.selection.signals)
         self.measured: Array | None = None  # signals of the record itself
         self.noise: tuple[tuple[int, ...], States] | None = None  # of the last draw: its key, filter(xi)
         linear = self.selection.signals.median == 1 and task.settings.rounding in ADDED
@@ -161,15 +86,13 @@ class PartWorkspace:
 
     def rows(self, level: Level, keys: tuple[tuple[int, ...], tuple[int, ...]]) -> list[Array]:
         """[W_j[:, C_j] Y_j]' of every joint, shape (|C_j| + 1, rows of joint j), with perturbed measurements."""
-        task, signals, torque = self.work.task, self._signals(level, keys[0]), self.part.torque
-        if level.torque:
-            torque = decimated_torque(perturbed_torque(self.part.tau, level, task.settings, task.drives, keys[1]), self.selection)
+        signals, torque = self._signals(level, keys[0]), torque_rows(self.work.task, self.record, level, keys[1])
         return [self._joint(j, signals, torque[j]) for j in range(len(torque))]
 
     def _joint(self, j: int, signals: Array, torque: Array) -> Array:
-        chosen, kept, entries = self.work.by_joint[j], self.kept[j], self.work.entries
-        rows = np.empty((len(chosen) + 1, len(kept)))
-        np.multiply(entries.sign[chosen, None], signals[entries.which[chosen]][:, kept], out=rows[:-1])
+        own, kept, entries = self.work.by_joint[j], self.kept[j], self.work.entries
+        rows = np.empty((len(own) + 1, len(kept)))
+        np.multiply(entries.sign[own, None], signals[entries.which[own]][:, kept], out=rows[:-1])
         rows[-1] = torque[kept]
         return rows
 
@@ -180,10 +103,11 @@ class PartWorkspace:
                 self.measured = self._of(self.filtered)
             return self.measured
         if self.shares_noise:
-            return self._of(_moved(self.filtered, level.delta, self._filtered_noise(key)))
+            xi, q = self._filtered_noise(key), self.filtered
+            return self._of(States(q.q + level.delta * xi.q, q.qd + level.delta * xi.qd, q.qdd + level.delta * xi.qdd))
         task = self.work.task
-        q = perturbed_position(self.q, level, task.settings, task.drives, key)
-        return self._of(filtered_states(np.asfortranarray(q), self.part.rate, self.selection.signals))
+        q_run = perturbed_position(self.q, level, task.settings, task.drives, key)
+        return self._of(filtered_states(np.asfortranarray(q_run), self.record.rate, self.selection.signals))
 
     def _of(self, states: States) -> Array:
         signals = self.signals(states[self.selection.samples])
@@ -198,13 +122,11 @@ class PartWorkspace:
             xi = noise(self.q.shape, settings.rounding, stream(settings.seed, *key))
             if settings.side == "motor" and drives is not None:
                 xi = drives.joint_position(xi) - drives.offset
-            self.noise = key, filtered_states(np.asfortranarray(xi), self.part.rate, self.selection.signals)
+            self.noise = key, filtered_states(np.asfortranarray(xi), self.record.rate, self.selection.signals)
         return self.noise[1]
 
 
-def _moved(states: States, delta: float, by: States) -> States:
-    """filter(q) + Delta filter(xi)."""
-    return States(states.q + delta * by.q, states.qd + delta * by.qd, states.qdd + delta * by.qdd)
+Workspace = NumpyWorkspace | CompiledWorkspace
 
 
 class _Kept(threading.local):
@@ -220,7 +142,9 @@ _kept = _Kept()
 def workspace(task: Task) -> Workspace:
     """The workspace of a task, made at its first run in this thread."""
     if _kept.work is None or _kept.task is not task:
-        _kept.task, _kept.work = task, Workspace(task)
+        model = task.model.load() if isinstance(task.model, ModelText) else task.model
+        _kept.work = CompiledWorkspace(task, model) if isinstance(model, CompiledModel) else NumpyWorkspace(task, model)
+        _kept.task = task
     return _kept.work
 
 

@@ -1,4 +1,4 @@
-"""The `controller` section of a study file: who moves the arm, along what, and through which converters.
+"""The `controller` section of a study file: the closed loop that moves the arm, its reference, encoders and drives.
 
     controller:
       law: {kind: pid, kp: [450, ...], kd: [2.5, ...], ki: 0, gain: [35.24, ...]}
@@ -6,173 +6,205 @@
       reference: {points: {duration: 10, seed: 1}}
       encoder: {step: 2*pi/65536, side: motor}
 
-SI, rad, joint side. A number stands for all joints. Values are checked where they are made.
+SI, rad, joint side. A number stands for all joints.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import field
+from typing import Annotated, Any, Literal
 
-from runtime.errors import SettingsError
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from runtime.settings.schema import Count, Many, NotNegative, PerJoint, Positive, Real, Seed, Settings, Text, Whole, require
 from runtime.settings.trajectories import motion_from_mapping
 
-Number = float | tuple[float, ...]  # one for all joints, or one per joint
+
+def _a_motion(mapping: Mapping[str, Any]) -> Mapping[str, Any]:
+    motion_from_mapping(mapping)
+    return mapping
 
 
-@dataclass(frozen=True)
-class Law:
+class Law(Settings):
     """Control law of every joint on its own; e = q_r - q_m, u in the unit of the drive, torque = gain u.
 
     pid      u = kp e + kd (qd_r - qd_m) + ki I,                       I = integral of e
     cascade  u = kv (kp e + cv qd_r - qd_m) + ki I + ca qdd_r,         I = integral of kp e + cv qd_r - qd_m
 
-    kp, kd, kv, ki, ca : gains; kp of a cascade in 1/s.   cv : share of the reference velocity that is fed forward.
-    gain : torque per unit of u, N m or N.   antiwindup : largest |I|; null: none.
+    Attributes
+    ----------
+    kind : str
+        pid or cascade.
+    kp : float or tuple of float
+        Gain of the position; of a cascade in 1/s.
+    kd : float or tuple of float
+        Gain of the velocity of a pid.
+    kv : float or tuple of float
+        Gain of the velocity of a cascade.
+    ki : float or tuple of float
+        Gain of the integral.
+    cv : float or tuple of float
+        Share of the reference velocity that a cascade feeds forward.
+    ca : float or tuple of float
+        Gain of the reference acceleration that a cascade feeds forward.
+    gain : float or tuple of float, N m or N
+        Torque for one unit of u.
+    antiwindup : float, tuple of float, or None
+        Largest |I|; null: none.
     """
 
     kind: Literal["pid", "cascade"] = "pid"
-    kp: Number = 0.0
-    kd: Number = 0.0
-    kv: Number = 0.0
-    ki: Number = 0.0
-    cv: Number = 0.0
-    ca: Number = 0.0
-    gain: Number = 1.0
-    antiwindup: Number | None = None
+    kp: PerJoint[Real] = 0.0
+    kd: PerJoint[Real] = 0.0
+    kv: PerJoint[Real] = 0.0
+    ki: PerJoint[Real] = 0.0
+    cv: PerJoint[Real] = 0.0
+    ca: PerJoint[Real] = 0.0
+    gain: PerJoint[Real] = 1.0
+    antiwindup: PerJoint[Positive] | None = None
 
     def __post_init__(self) -> None:
-        _positive("antiwindup", self.antiwindup)
         for key in ("kv", "cv", "ca") if self.kind == "pid" else ("kd",):
-            if any(_each(getattr(self, key))):
-                raise SettingsError(f"{getattr(self, key)}; a {self.kind} law has no such gain", path=(key,))
+            value = getattr(self, key)
+            require(not np.any(value), f"{value}; a {self.kind} law has no such gain", key)
 
 
-@dataclass(frozen=True)
-class Encoder:
-    """What the controller sees of the position: noise of deviation `noise`, then steps of size `step`; null: none. Rad or m of that side."""
+class Encoder(Settings):
+    """Measured position: white noise is added, then the sum is rounded to steps. Rad or m of its side.
 
-    step: Number | None = None
-    noise: Number = 0.0
+    Attributes
+    ----------
+    step : float, tuple of float, or None, rad or m
+        Size of the steps; null: none.
+    noise : float or tuple of float, rad or m
+        Standard deviation of the noise.
+    side : str
+        joint or motor.
+    """
+
+    step: PerJoint[Positive] | None = None
+    noise: PerJoint[NotNegative] = 0.0
     side: Literal["joint", "motor"] = "joint"
 
-    def __post_init__(self) -> None:
-        _positive("step", self.step)
-        _not_negative("noise", self.noise)
 
-
-@dataclass(frozen=True)
-class Torque:
+class Torque(Settings):
     """From the command to the arm and to the record, N m or N of the joint.
 
-    saturation : largest torque; "limits": that of the robot file, where it has one; null: none.   step : of the converter, after the saturation.
-    noise : deviation of white noise on the recorded torque.   disturbance : deviation of a torque on the arm that nobody records, white up to
-    `bandwidth`, Hz.
+    Attributes
+    ----------
+    saturation : float, tuple of float, "limits" or None, N m or N
+        Largest torque; limits: that of the robot file, where it has one; null: none.
+    step : float, tuple of float, or None, N m or N
+        Step of the converter, after the saturation.
+    noise : float or tuple of float, N m or N
+        Standard deviation of white noise on the recorded torque.
+    disturbance : float or tuple of float, N m or N
+        Standard deviation of a torque on the arm that is not recorded, white up to `bandwidth`.
+    bandwidth : float, Hz
+        Bandwidth of the disturbance.
     """
 
-    saturation: Number | Literal["limits"] | None = "limits"
-    step: Number | None = None
-    noise: Number = 0.0
-    disturbance: Number = 0.0
-    bandwidth: float = 50.0
-
-    def __post_init__(self) -> None:
-        if self.saturation != "limits":
-            _positive("saturation", self.saturation)
-        _positive("step", self.step)
-        _positive("bandwidth", self.bandwidth)
-        _not_negative("noise", self.noise)
-        _not_negative("disturbance", self.disturbance)
+    saturation: PerJoint[Positive] | Literal["limits"] | None = "limits"
+    step: PerJoint[Positive] | None = None
+    noise: PerJoint[NotNegative] = 0.0
+    disturbance: PerJoint[NotNegative] = 0.0
+    bandwidth: Positive = 50.0
 
 
-@dataclass(frozen=True)
-class Points:
-    """Point to point between random points in the middle of the range, as fast as the limits of the robot file allow; s."""
+class Points(Settings):
+    """Motion between random points in the middle of the range, as fast as the limits of the robot file allow.
 
-    duration: float = 10.0
-    seed: int = 1
-
-    def __post_init__(self) -> None:
-        _positive("duration", self.duration)
-
-
-@dataclass(frozen=True)
-class ReferenceSettings:
-    """What the controller follows: one of a file, the reference of a record of the study, a motion by its coefficients, random points.
-
-    file : CSV with columns q1 ..., qd1 ..., qdd1 ... (and t), at the controller rate, rad or m; derivatives that are missing are differences.
-    record : index, from 0, of a record that holds its reference, columns qr1 ...   motion : as `runtime.settings.trajectories.motion_from_mapping` reads it.
-    limits : "refuse" a reference outside the limits of the robot file, or "ignore" them.
+    Attributes
+    ----------
+    duration : float, s
+        Length of the motion.
+    seed : int
+        Seed of the points.
     """
 
-    file: str | None = None
-    record: int | None = None
-    motion: Mapping[str, Any] | None = None
+    duration: Positive = 10.0
+    seed: Whole = 1
+
+
+class ReferenceSettings(Settings):
+    """Motion that the controller follows; at most one of file, record, motion, points.
+
+    Attributes
+    ----------
+    file : str or None
+        CSV with columns q1 ..., qd1 ..., qdd1 ... (and t), at the controller rate, rad or m; missing derivatives are differences.
+    record : int or None
+        Index, from 0, of a record that holds its reference, columns qr1 ...
+    motion : mapping or None
+        Parts with their coefficients, as `runtime.settings.trajectories.motion_from_mapping` reads them.
+    points : Points or None
+        Random points.
+    limits : str
+        refuse a reference outside the limits of the robot file, or ignore the limits.
+    """
+
+    file: Text | None = None
+    record: Whole | None = None
+    motion: Annotated[Mapping[str, Any], AfterValidator(_a_motion)] | None = None
     points: Points | None = None
     limits: Literal["refuse", "ignore"] = "refuse"
 
     def __post_init__(self) -> None:
         given = [k for k in ("file", "record", "motion", "points") if getattr(self, k) is not None]
-        if len(given) > 1:
-            raise SettingsError(f"{' and '.join(given)}; expected one of file, record, motion, points", path=(given[1],))
-        if self.motion is not None:
-            try:
-                motion_from_mapping(self.motion)
-            except SettingsError as e:
-                raise SettingsError(e.reason, path=("motion", *e.path)) from None
+        require(len(given) <= 1, f"{' and '.join(given)}; expected one of file, record, motion, points", *given[1:2])
 
 
-@dataclass(frozen=True)
-class Controller:
+class Controller(Settings):
     """A closed loop.
 
-    rate : of the controller, Hz; torque is held between its ticks.   delay : ticks from measurement to torque, 0 or 1.
-    velocity : qd_m as the "difference" of two positions, or of two "averaged" ones, (q_k - q_(k-2))/2T.
-    feedforward : "values" adds the torque of the reference with the parameters of the robot file.
-    record_every : ticks per recorded sample.   settle : s at rest on the first reference point before the motion, where there is an integral.
-    integrator : "rk4" in substeps of at most `pole_step` over the fastest closed-loop pole, or "cvodes".   start : joint positions at t = 0;
-    default: the first reference point.   values : parameters that replace those of the robot file.   seed : of all noise.
+    Attributes
+    ----------
+    law : Law
+        Control law.
+    rate : float, Hz
+        Rate of the controller; torque is held between its ticks.
+    delay : int
+        Ticks from measurement to torque, 0 or 1.
+    velocity : str
+        qd_m as the difference of two positions, or averaged, (q_k - q_(k-2))/2T.
+    feedforward : str
+        values adds the torque of the reference with the parameters of the robot file.
+    encoder : Encoder
+        Measurement of the positions.
+    torque : Torque
+        Way of the torque to the arm and to the record.
+    reference : ReferenceSettings
+        Motion that is followed.
+    record_every : int
+        Ticks for one recorded sample.
+    settle : float, s
+        Time at rest on the first reference point before the motion, where the law has an integral.
+    integrator : str
+        rk4 in substeps of at most `pole_step` over the fastest closed-loop pole, or cvodes.
+    pole_step : float
+        Largest product of substep and fastest pole.
+    start : tuple of float or None, rad or m
+        Joint positions at t = 0; default: the first reference point.
+    values : mapping of float
+        Parameters, by name, that replace those of the robot file.
+    seed : int
+        Seed of all noise.
     """
 
     law: Law = field(default_factory=Law)
-    rate: float = 1000.0
-    delay: int = 0
+    rate: Positive = 1000.0
+    delay: Annotated[Whole, Field(ge=0, le=1)] = 0
     velocity: Literal["difference", "averaged"] = "difference"
     feedforward: Literal["none", "values"] = "none"
     encoder: Encoder = field(default_factory=Encoder)
     torque: Torque = field(default_factory=Torque)
     reference: ReferenceSettings = field(default_factory=ReferenceSettings)
-    record_every: int = 1
-    settle: float = 0.5
+    record_every: Count = 1
+    settle: Annotated[Real, Field(ge=0, le=60)] = 0.5
     integrator: Literal["rk4", "cvodes"] = "rk4"
-    pole_step: float = 0.2
-    start: tuple[float, ...] | None = None
-    values: Mapping[str, float] = field(default_factory=dict)
-    seed: int = 1
-
-    def __post_init__(self) -> None:
-        _positive("rate", self.rate)
-        _positive("pole_step", self.pole_step)
-        if not 0 <= self.settle <= 60:
-            raise SettingsError(f"{self.settle}; expected 0 to 60 s", path=("settle",))
-        if self.delay not in (0, 1):
-            raise SettingsError(f"{self.delay} ticks; expected 0 or 1", path=("delay",))
-        if self.record_every < 1:
-            raise SettingsError(f"{self.record_every}; expected 1 or more ticks per sample", path=("record_every",))
-        if self.seed < 0:
-            raise SettingsError(f"{self.seed}; expected 0 or more", path=("seed",))
-
-
-def _positive(key: str, value: Number | None) -> None:
-    if value is not None and not all(x > 0 for x in _each(value)):
-        raise SettingsError(f"{value}; expected positive numbers", path=(key,))
-
-
-def _not_negative(key: str, value: Number) -> None:
-    if not all(x >= 0 for x in _each(value)):
-        raise SettingsError(f"{value}; expected 0 or more", path=(key,))
-
-
-def _each(value: Number) -> tuple[float, ...]:
-    return value if isinstance(value, tuple) else (value,)
+    pole_step: Positive = 0.2
+    start: Many[Real] | None = None
+    values: Mapping[Text, Real] = field(default_factory=dict)
+    seed: Seed = 1

@@ -3,79 +3,106 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import field
+from typing import Annotated, Any, Literal
 
-from runtime.errors import SettingsError
-from runtime.settings.trajectories import Family, family_from_mapping
+from pydantic import Field
 
-
-@dataclass(frozen=True)
-class Sphere:
-    """A ball carried by frame `frame`: centre in that frame, m; radius, m."""
-
-    frame: int
-    radius: float
-    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        if not self.radius > 0:
-            raise SettingsError(f"{self.radius}; expected more than 0", path=("radius",))
+from runtime.settings.families import Family, family_from_mapping
+from runtime.settings.schema import Count, Many, Positive, Real, Settings, Text, Whole, require
 
 
-@dataclass(frozen=True)
-class ExcitationSettings:
-    """The search for an exciting motion.
+class Sphere(Settings):
+    """A ball that moves with a frame.
 
-    parts : families in the order they are run through (`runtime.settings.trajectories`), each a mapping with its `family`.
-    criterion : "cond", "logdet" or "sigma".   columns : "essential" (of an estimate), "all" or names.
-    limits : q, qd, qdd, tau in place of those of the robot file: one per joint, or (lower, upper) for q.
-    torque_rms, torque_rate : largest root mean square, N m, and rate of change, N m/s, of each torque; None: unlimited.
-    margin : share of every limit that the optimiser keeps free between its grid points.
-    grid : points of the optimiser, Hz.   rate : controller rate, Hz.   begin : positions at the start; None: free.
-    spheres, apart : balls on the links, and pairs of them (by number, from 1) whose surfaces stay `gap` m from each other; apart: None means
-        every pair on frames that are not next to each other.
-    smooth : v0 of tanh(qd/v0), which stands for sign(qd) inside the optimiser only, rad/s or m/s.
-    torque_sigma : s_j, one per joint, N m; None: those of an estimate, else 1 for every joint.
-    starts : random starts.   iterations : of the optimiser in each of its two stages.   seed : of the starts.
+    Attributes
+    ----------
+    frame : int
+        Number of the frame.
+    radius : float, m
+        Radius.
+    centre : tuple of 3 float, m
+        Centre, in that frame.
     """
 
-    parts: tuple[Mapping[str, Any], ...] = (
+    frame: Whole
+    radius: Positive
+    centre: tuple[Real, Real, Real] = (0.0, 0.0, 0.0)
+
+
+class ExcitationSettings(Settings):
+    """The search for an exciting motion.
+
+    Attributes
+    ----------
+    parts : tuple of mapping
+        Families in the order of the motion (`runtime.settings.trajectories`), each a mapping with its `family`.
+    criterion : str
+        cond, logdet or sigma.
+    columns : str or tuple of str
+        essential (of an estimate), all, or names.
+    limits : mapping
+        q, qd, qdd, tau in place of those of the robot file: one value per joint, or [lower, upper] for q.
+    torque_rms : tuple of float or None, N m or N
+        Largest root mean square of each torque; null: unlimited.
+    torque_rate : tuple of float or None, N m/s or N/s
+        Largest rate of change of each torque; null: unlimited.
+    margin : float
+        Share of every limit that the optimiser keeps free between its grid points.
+    grid : float, Hz
+        Points of the optimiser.
+    rate : float, Hz
+        Rate of the controller.
+    begin : tuple of float or None, rad or m
+        Positions at the start; null: free.
+    spheres : tuple of Sphere
+        Balls on the links.
+    apart : tuple of pairs of int, or None
+        Pairs of balls, by number from 1, that stay apart; null: every pair on frames that are not next to each other.
+    gap : float, m
+        Smallest distance between the surfaces of such a pair.
+    smooth : float, rad/s or m/s
+        v0 of tanh(qd/v0), which stands for sign(qd) inside the optimiser only.
+    torque_sigma : tuple of float or None, N m or N
+        Deviation s_j of each torque; null: those of an estimate, else 1 for every joint.
+    starts : int
+        Random starts.
+    iterations : int
+        Iterations of the optimiser in each of its two stages.
+    seed : int
+        Seed of the starts.
+    """
+
+    parts: Annotated[Many[Mapping[str, Any]], Field(min_length=1)] = (
         {"family": "fourier", "period": 10.0, "harmonics": 5},
         {"family": "point-to-point", "points": 7, "travel": 1.0, "blend": 0.25},
     )
     criterion: Literal["cond", "logdet", "sigma"] = "cond"
-    columns: Literal["essential", "all"] | tuple[str, ...] = "essential"
+    columns: Literal["essential", "all"] | Many[Text] = "essential"
     limits: Mapping[str, Any] = field(default_factory=dict)
-    torque_rms: tuple[float, ...] | None = None
-    torque_rate: tuple[float, ...] | None = None
-    margin: float = 0.02
-    grid: float = 20.0
-    rate: float = 1000.0
-    begin: tuple[float, ...] | None = None
-    spheres: tuple[Sphere, ...] = ()
-    apart: tuple[tuple[int, int], ...] | None = None
-    gap: float = 0.0
-    smooth: float = 0.05
-    torque_sigma: tuple[float, ...] | None = None
-    starts: int = 10
-    iterations: int = 200
-    seed: int = 1
+    torque_rms: Many[Real] | None = None
+    torque_rate: Many[Real] | None = None
+    margin: Annotated[Real, Field(ge=0, lt=1)] = 0.02
+    grid: Positive = 20.0
+    rate: Positive = 1000.0
+    begin: Many[Real] | None = None
+    spheres: Many[Sphere] = ()
+    apart: tuple[tuple[Whole, Whole], ...] | None = None
+    gap: Real = 0.0
+    smooth: Positive = 0.05
+    torque_sigma: Many[Real] | None = None
+    starts: Count = 10
+    iterations: Count = 200
+    seed: Whole = 1
 
     def __post_init__(self) -> None:
-        for name in ("grid", "rate", "smooth"):
-            _require(getattr(self, name) > 0, name, f"{getattr(self, name)}; expected more than 0")
-        for name in ("starts", "iterations"):
-            _require(getattr(self, name) >= 1, name, f"{getattr(self, name)}; expected at least 1")
-        _require(0 <= self.margin < 1, "margin", f"{self.margin}; expected a share between 0 and 1")
-        _require(len(self.parts) > 0, "parts", "no part; expected at least one family")
         for pair in self.apart or ():
-            _require(all(1 <= k <= len(self.spheres) for k in pair), "apart", f"{list(pair)}; there are {len(self.spheres)} spheres")
+            require(all(1 <= k <= len(self.spheres) for k in pair), f"{list(pair)}; there are {len(self.spheres)} spheres", "apart")
         _ = self.families
 
     @property
     def families(self) -> tuple[Family, ...]:
-        """The parts, made."""
+        """Families of the parts."""
         return tuple(family_from_mapping(part, ("parts", k)) for k, part in enumerate(self.parts))
 
     @property
@@ -85,8 +112,3 @@ class ExcitationSettings:
             return tuple((a - 1, b - 1) for a, b in self.apart)
         count = range(len(self.spheres))
         return tuple((a, b) for a in count for b in count if a < b and abs(self.spheres[a].frame - self.spheres[b].frame) > 1)
-
-
-def _require(ok: bool, name: str, message: str) -> None:
-    if not ok:
-        raise SettingsError(message, path=(name,))

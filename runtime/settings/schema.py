@@ -1,135 +1,177 @@
-"""Plain mappings to frozen dataclasses and back, with the path of the offending key in every error.
+"""Settings as frozen dataclasses that pydantic checks: their base, the types of their fields, mappings in and out.
 
-The type hints of a dataclass are its schema: dataclass, Literal, str, int, float, bool, tuple[X, ...], tuple[X, Y], Mapping, unions with None.
-A float may be an arithmetic text (`2*pi/10000`), a field with a reader of its own what that understands (`30 rpm`); one value stands for a list of one; an integer key stands for its text.
+    class Lowpass(Settings):
+        cutoff: Positive = 50.0
+
+    Lowpass(cutoff=-1)                       # SettingsError: cutoff: -1; expected more than 0
+    structure(Lowpass, {"cutoff": "2*50"})   # Lowpass(cutoff=100.0)
+
+A number may be an arithmetic text (`2*pi/10000`), one value stands for a list of one, an integer stands for its text.
 """
 
 from __future__ import annotations
 
-import types
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields, is_dataclass
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from abc import ABCMeta
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, field, fields
+from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
-from runtime.errors import InputError, SettingsError
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic.dataclasses import dataclass
+from pydantic_core import ArgsKwargs
+
+from runtime.errors import SettingsError, settings_error, shown
 from runtime.settings.arithmetic import number
 
 T = TypeVar("T")
 Path = tuple[str | int, ...]
+CONFIG = ConfigDict(extra="forbid", defer_build=True)  # built when the first instance is made
+
+
+class Written:
+    """Annotation of a type that a file may write in a further way: what the JSON Schema of the type says in its place.
+
+    Parameters
+    ----------
+    form : callable
+        From the JSON Schema of the type to that of everything a file may write.
+    """
+
+    def __init__(self, form: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
+        self.form = form
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+        return self.form(handler(schema))
+
+
+def _number(value: Any) -> Any:
+    try:
+        return number(value) if isinstance(value, str) else value
+    except ValueError as e:
+        raise ValueError(f"{e}; expected a number") from None
+
+
+def _text(value: Any) -> Any:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _list(value: Any) -> Any:
+    several = value is None or (isinstance(value, Iterable) and not isinstance(value, str | Mapping))
+    return value if several else (value,)
+
+
+Real = Annotated[
+    float, Field(strict=True, allow_inf_nan=False), BeforeValidator(_number), Written(lambda s: {**s, "type": ["number", "string"]})
+]
+Positive = Annotated[Real, Field(gt=0)]
+NotNegative = Annotated[Real, Field(ge=0)]
+Whole = Annotated[int, Field(strict=True)]
+Count = Annotated[Whole, Field(ge=1)]
+Seed = Annotated[Whole, Field(ge=0)]
+Flag = Annotated[bool, Field(strict=True)]
+Text = Annotated[str, BeforeValidator(_text)]
+PerJoint: TypeAlias = T | tuple[T, ...]
+"""One value for all joints, or one per joint."""
+Many = Annotated[tuple[T, ...], BeforeValidator(_list), Written(lambda s: {"anyOf": [s, s["items"]]})]
+"""A list; one value stands for a list of one."""
+
+
+def require(ok: bool, message: str, *path: str | int) -> None:
+    """SettingsError about the key at `path` of the settings that call this function in their __post_init__."""
+    if not ok:
+        raise SettingsError(message, path=path)
+
+
+def _odd(value: int) -> int:
+    if value % 2 == 0:
+        raise SettingsError(f"{value}; expected an odd window, 1 for no median filter")
+    return value
+
+
+def _in_order(window: tuple[float | None, float | None]) -> tuple[float | None, float | None]:
+    t0, t1 = window
+    if t0 is not None and t1 is not None and not t0 < t1:
+        raise SettingsError(f"[{t0}, {t1}]; expected the earlier time first")
+    return window
+
+
+def _not_one(runs: int) -> int:
+    if runs == 1:
+        raise SettingsError("1 run; expected 0 or at least 2")
+    return runs
+
+
+Resamples = Annotated[Seed, AfterValidator(_not_one)]
+OddWindow = Annotated[Count, AfterValidator(_odd)]
+Interval = Annotated[tuple[Real | None, Real | None], AfterValidator(_in_order)]
+"""[t0, t1] in s; null leaves an end open."""
+
+
+class Reporting(ABCMeta):
+    """Type of settings: values that pydantic refuses become a SettingsError, which names the key and what it expects."""
+
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+        try:
+            return super().__call__(*args, **kwargs)
+        except ValidationError as e:
+            problem = settings_error(e, {**dict(enumerate(args)), **kwargs})
+            first = [fields(cls)[k].name if isinstance(k, int) else k for k in problem.path[:1]]  # type: ignore[arg-type]
+            raise SettingsError(problem.reason, path=(*first, *problem.path[1:])) from None
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+@dataclass(frozen=True, config=CONFIG)
+class Settings(metaclass=Reporting):
+    """Base of all settings. A subclass is a frozen dataclass of which only instances with valid values can be made."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, config=CONFIG)(cls)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, value: Any) -> Any:
+        given = value.kwargs or {} if isinstance(value, ArgsKwargs) else value
+        if isinstance(given, cls):
+            return given
+        names = [f.name for f in fields(cls)]
+        if not isinstance(given, Mapping):
+            raise SettingsError(f"{shown(given)}; expected a mapping with some of {', '.join(names)}")
+        if unknown := [str(k) for k in given if k not in names]:
+            several = "s" if len(unknown) > 1 else ""
+            raise SettingsError(f"unknown key{several} {', '.join(unknown)}; known: {', '.join(names)}", path=(unknown[0],))
+        return value
 
 
 def structure(cls: type[T], value: Any, path: Path = ()) -> T:
-    """The dataclass `cls` of a mapping; raises SettingsError for unknown keys, wrong types and values it refuses."""
-    if not isinstance(value, Mapping):
-        raise SettingsError(f"{_show(value)}; expected a mapping with some of {', '.join(_names(cls))}", path=path)
-    unknown = [str(k) for k in value if k not in _names(cls)]
-    if unknown:
-        raise SettingsError(
-            f"unknown key{'s' if len(unknown) > 1 else ''} {', '.join(unknown)}; known: {', '.join(_names(cls))}", path=(*path, unknown[0])
-        )
-    needed = [f.name for f in fields(cls) if f.default is MISSING and f.default_factory is MISSING]  # type: ignore[arg-type]
-    if missing := [name for name in needed if name not in value]:
-        raise SettingsError(f"no key {', '.join(missing)}; add it", path=path)
-    hints = get_type_hints(cls)
-    read = {f.name: f.metadata["read"] for f in fields(cls) if "read" in f.metadata}  # type: ignore[arg-type]
-    arguments = {k: _convert(hints[k], _read(read[k], v, (*path, k)) if k in read else v, (*path, k)) for k, v in value.items()}
-    try:
-        return cls(**arguments)
-    except SettingsError as e:
-        raise SettingsError(e.reason, path=(*path, *e.path)) from None
-    except InputError as e:
-        raise SettingsError(e.message, path=path) from None
+    """The settings of a mapping.
 
+    Parameters
+    ----------
+    cls : type
+        A subclass of Settings.
+    value : mapping
+        As read from a file.
+    path : tuple of str and int
+        Keys that lead to `value` in its file.
 
-def _read(reader: Callable[[Any], Any], value: Any, path: Path) -> Any:
-    """The value as the reader of its field, `metadata={"read": ...}`, understands it."""
+    Raises
+    ------
+    SettingsError
+        For unknown keys, other types and values out of range, with the path of the key.
+    """
     try:
-        return reader(value)
-    except InputError as e:
-        raise SettingsError(e.message, path=path) from None
+        return TypeAdapter(cls).validate_python(value)
+    except ValidationError as e:
+        raise settings_error(e, value, path) from None
 
 
 def plain(value: Any) -> Any:
     """Tuples as lists, mappings as dicts, at every depth."""
     if isinstance(value, Mapping):
         return {k: plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    return value
+    return [plain(v) for v in value] if isinstance(value, list | tuple) else value
 
 
-def _names(cls: type) -> list[str]:
-    return [f.name for f in fields(cls)]
-
-
-def _convert(hint: Any, value: Any, path: Path) -> Any:
-    origin = get_origin(hint)
-    if origin in (Union, types.UnionType):
-        return _one_of(get_args(hint), value, path)
-    if origin is Literal:
-        if isinstance(value, bool) or value not in get_args(hint):
-            raise SettingsError(f"{_show(value)}; expected {' or '.join(map(str, get_args(hint)))}", path=path)
-        return value
-    if origin is tuple:
-        return _sequence(get_args(hint), value, path)
-    if is_dataclass(hint):
-        return structure(hint, value, path)  # type: ignore[arg-type]
-    if origin is not None:  # Mapping
-        if not isinstance(value, Mapping):
-            raise SettingsError(f"{_show(value)}; expected a mapping", path=path)
-        return {str(k): _convert(get_args(hint)[1], v, (*path, k)) for k, v in value.items()}
-    return _scalar(hint, value, path)
-
-
-def _one_of(hints: tuple[Any, ...], value: Any, path: Path) -> Any:
-    """The first member of a union that takes the value; the error is that of the member of the value's own kind."""
-    if value is None and type(None) in hints:
-        return None
-    errors: list[SettingsError] = []
-    for hint in hints:
-        if hint is not type(None):
-            try:
-                return _convert(hint, value, path)
-            except SettingsError as e:
-                errors.append(e)
-    deepest = max(errors, key=lambda e: len(e.path))
-    if len(deepest.path) > len(path) or len(errors) == 1:
-        raise deepest
-    expected = " or ".join(e.reason.split("; expected ", 1)[-1] for e in errors)
-    raise SettingsError(f"{_show(value)}; expected {expected}", path=path)
-
-
-def _sequence(hints: tuple[Any, ...], value: Any, path: Path) -> tuple[Any, ...]:
-    many = len(hints) == 2 and hints[1] is Ellipsis
-    if isinstance(value, list | tuple):
-        values = list(value)
-    elif many and value is not None:  # one value stands for a list of one
-        return (_convert(hints[0], value, path),)
-    else:
-        raise SettingsError(f"{_show(value)}; expected a list{'' if many else f' of {len(hints)}'}", path=path)
-    if not many and len(values) != len(hints):
-        raise SettingsError(f"{len(values)} values; expected {len(hints)}", path=path)
-    each = [hints[0]] * len(values) if many else hints
-    return tuple(_convert(h, v, (*path, i)) for i, (h, v) in enumerate(zip(each, values, strict=True)))
-
-
-def _scalar(hint: Any, value: Any, path: Path) -> Any:
-    if hint is Any:
-        return value
-    if hint is bool and isinstance(value, bool):
-        return value
-    if hint is str and isinstance(value, str | int) and not isinstance(value, bool):
-        return str(value)
-    if hint is int and isinstance(value, int) and not isinstance(value, bool):
-        return int(value)
-    if hint is float and isinstance(value, int | float | str) and not isinstance(value, bool):
-        try:
-            return number(value if isinstance(value, str) else repr(float(value)))
-        except (ValueError, OverflowError) as e:
-            raise SettingsError(f"{e}; expected a number", path=path) from None
-    expected = {int: "an integer", float: "a number", str: "a text", bool: "true or false"}[hint]
-    raise SettingsError(f"{_show(value)}; expected {expected}", path=path)
-
-
-def _show(value: Any) -> str:
-    return repr(plain(value))[:80] if isinstance(value, Mapping | list | tuple) else repr(value)[:80]
+def to_mapping(settings: Any) -> dict[str, Any]:
+    """Complete plain mapping (dicts, lists, numbers, texts) of a Study or of one of its sections; study_from_mapping(to_mapping(s)) == s."""
+    return plain(asdict(settings))  # type: ignore[no-any-return]

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from runtime.model.generated import GeneratedModel
     from runtime.records.record import Record
     from runtime.resolution.advice import Advice
+    from runtime.result_files import Results
     from runtime.settings.study import Study
-    from symgen.cli.writing import Results
 
 
 def advised(

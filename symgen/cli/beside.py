@@ -138,6 +138,6 @@ def beside(
 def judgement(model: GeneratedModel, fit: Estimate) -> Feasibility:
     """Whether a physical robot can have the parameters of an estimate."""
     from runtime.estimators.feasibility import feasibility
-    from runtime.estimators.physical import physical_model
+    from runtime.model.inertia import physical_model
 
     return feasibility(physical_model(model), fit.names, fit.X)

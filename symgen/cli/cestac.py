@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from runtime.result_files import reserved
 from symgen.cli.session import (
     NEGATIVE,
     RECORDS,
@@ -21,7 +22,6 @@ from symgen.cli.session import (
     study_and_records,
     study_text,
 )
-from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.resolution.checkpoint import Checkpoint

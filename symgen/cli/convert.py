@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from runtime.result_files import write_all
 from symgen.cli.session import fail, reported_errors
 from symgen.cli.snippet import with_estimate
-from symgen.cli.writing import write_all
 
 if TYPE_CHECKING:
     from symgen.description import Robot

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from runtime.result_files import reserved
 from symgen.cli.session import opened_model, progress_bar, reported_errors, single_thread, symbolic_file, yaml_text
-from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.excitation.criteria import Limits, Weights
@@ -62,9 +62,9 @@ def excite(
     with reported_errors(), reserved(output) as results, opened_model(robot) as model:
         from runtime.excitation.criteria import limits_of
         from runtime.excitation.search import excite as search
+        from runtime.records.named import study_of
         from runtime.records.reading import read_records
         from runtime.settings.excitation import ExcitationSettings
-        from runtime.settings.files import study_of
         from runtime.settings.schema import structure
         from runtime.settings.study import Study, to_mapping
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from runtime.result_files import reserved, write_all
 from symgen.cli.session import NEGATIVE, reported_errors, single_thread
-from symgen.cli.writing import reserved, write_all
 
 if TYPE_CHECKING:
     from symgen.cli.fleet_jobs import Done, Job, Row
@@ -74,7 +74,7 @@ def finished(jobs: Sequence[Job], output: Path | None, workers: int, scheduler: 
 
 def summary_text(rows: Sequence[Row]) -> str:
     """The table, then what failed and why."""
-    from runtime.estimators.estimate import aligned
+    from runtime.table import aligned
     from symgen.cli.fleet_jobs import shortened
 
     def number(value: float | None, form: str) -> str:

@@ -16,8 +16,7 @@ from typing import Any
 
 from runtime.errors import InputError, SettingsError
 from runtime.identification.identification import Identification, identification
-from runtime.model.generated import GeneratedModel
-from runtime.model.text import ModelText
+from runtime.model.generated import GeneratedModel, ModelText
 from runtime.records.datasets import DATASETS
 from runtime.records.reading import read_records
 from runtime.records.record import Record

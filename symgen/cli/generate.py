@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
+from runtime.result_files import write_all
 from symgen.cli.doubts import tell_doubts
 from symgen.cli.session import NEGATIVE, fail, reported_errors
-from symgen.cli.writing import write_all
 
 TARGETS = {"numpy": "{}.py", "casadi": "{}_casadi.py", "c": "{}.c", "xp": "{}_xp.py"}
 
@@ -43,14 +43,13 @@ def generate(
 def emitted(robots: list[str], targets: Sequence[str] = ("numpy",)) -> dict[str, str]:
     """{file name: text} of every robot and target. Raises SymgenError before anything is written."""
     from symgen.description import load_robot, packaged_robots
-    from symgen.emit import generate_files
+    from symgen.emit.certified import certified_files
 
     modules: dict[str, str] = {}
     for source in packaged_robots() if robots == ["all"] else robots:
         robot = load_robot(source)
         tell_doubts(robot)
-        command = Path(source).name if source.endswith((".yaml", ".yml", ".par", ".urdf")) else source
-        files = generate_files(robot, targets=targets, command=command)
+        files = certified_files(robot, targets=targets, command=source if source in packaged_robots() else robot.file)
         if modules.keys() & files.keys():
             fail(f"two robots are called {robot.name}; their modules would overwrite each other")
         for left_out in (t for t in targets if TARGETS[t].format(robot.name) not in files):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from runtime.result_files import reserved
 from symgen.cli.beside import Beside, beside
 from symgen.cli.session import (
     NEGATIVE,
@@ -21,7 +22,6 @@ from symgen.cli.session import (
     study_with_records,
     symbolic_file,
 )
-from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.estimators.closed_loop import Simulator

@@ -9,8 +9,8 @@ from urllib.parse import quote
 
 import typer
 
+from runtime.result_files import write_all
 from symgen.cli.session import fail, reported_errors
-from symgen.cli.writing import write_all
 
 
 def schema_address(file: Path) -> str:

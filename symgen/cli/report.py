@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from runtime.result_files import reserved
 from symgen.cli.session import NEGATIVE, RECORDS, opened_model, origin, reported_errors, single_thread, study_text, study_with_records
-from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.identification.identification import Identification

@@ -106,7 +106,7 @@ def in_target(robot: str, model: GeneratedModel, target: str) -> GeneratedModel:
     import warnings
 
     from runtime.model.compiled import compiled_model
-    from runtime.resolution.c.cestac_run import usable
+    from runtime.resolution.c.workspace import usable
 
     if target not in ("numpy", "c"):
         fail(f"--target {target}; expected numpy or c")
@@ -159,7 +159,7 @@ def study_with_records(records: Sequence[str]) -> tuple[Study, Path]:
     """
     from runtime.errors import InputError
     from runtime.records.formats.table import is_measured
-    from runtime.settings.files import study_of
+    from runtime.records.named import study_of
 
     study, folder = study_of(records[0])
     if not study.record:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from runtime.result_files import reserved
 from symgen.cli.session import SIMULATED, fail, opened_model, reported_errors, single_thread, study_text, symbolic_file
-from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     import numpy as np
@@ -39,8 +39,8 @@ def simulate(
         from runtime.model.casadi import load_symbolic
         from runtime.motion.reference import reference_of
         from runtime.motion.simulation import Simulator, parameters_of
+        from runtime.records.named import study_of
         from runtime.records.reading import read_records
-        from runtime.settings.files import study_of
 
         settings, folder = study_of(study)
         controller = settings.controller

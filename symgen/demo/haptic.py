@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from runtime.records.record import Record
     from runtime.resolution.result import Cestac, LevelResult
     from runtime.resolution.rounding import Mode
+    from runtime.result_files import Results
     from runtime.settings.study import Study
-    from symgen.cli.writing import Results
 
 ROBOT = "haptic"
 HANDLE = 4  # frame of the support of the handle

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from runtime.result_files import reserved
 from symgen.cli.session import opened_model, reported_errors, single_thread, study_text
-from symgen.cli.writing import reserved
 
 if TYPE_CHECKING:
     from runtime.model.generated import GeneratedModel
     from runtime.records.record import Record
+    from runtime.result_files import Results
     from runtime.settings.study import Study
-    from symgen.cli.writing import Results
     from symgen.demo.demonstration import Demonstration
 
 ROBOT, DATASET = "tx40", "tx40"

@@ -15,17 +15,19 @@ open tree). A mechanism with loops is the tree restricted to q = f(qa), where ph
 
     Gamma_a = G' Gamma_tree,   G = dq/dqa,   qd = G qad,   qdd = G qadd + Gdot qad .
 
-`check` and the tests import this module; nothing else does.
+The certificates and the tests import this module; nothing else does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from symgen.derive.loops import close
 from symgen.description.expression import Expression
 from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Robot, parameter
 from symgen.errors import DescriptionError
@@ -265,28 +267,72 @@ def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, float]
     return ca.SX(e.evaluate(values.__getitem__, function, float))
 
 
-def numeric_regressor(
-    robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None
-) -> tuple[Array, tuple[str, ...]]:
-    """W of `states` random states (q within pi rad or 1 m, general loops within 0.5 of their start) and the names of its columns.
+@dataclass(frozen=True)
+class Sample:
+    """The standard regressor at random states.
 
-    W : ndarray, shape (n_a*states, p), rows joint-major. Velocities and accelerations are standard normal.
+    Attributes
+    ----------
+    model : Lagrange
+        Dynamics by energies.
+    q, qd, qdd : ndarray, shape (N, n), SI and rad
+        States of the actuated joints, in the order of `robot.joints`.
+    D : ndarray, shape (N, n, p)
+        Gamma = D chi at each state, chi in the order of `robot.parameters`.
+    """
+
+    model: Lagrange
+    q: Array
+    qd: Array
+    qdd: Array
+    D: Array
+
+    @property
+    def W(self) -> Array:
+        """D of all states, shape (n*N, p), rows joint-major."""
+        return self.D.transpose(1, 0, 2).reshape(-1, self.D.shape[2])
+
+
+def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None) -> Sample:
+    """The standard regressor at `states` random states: q within pi rad or 1 m, general loops within 0.5 of their start.
+
+    Velocities and accelerations are standard normal. Raises DescriptionError where the loops close in too few of the states.
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
     start = {j: x for loop in robot.loops for j, x in loop.start.items()}
     free = not robot.loops or set(robot.passive) <= set(robot.constraints)
     reach = np.array([np.pi if robot.frame(j).sigma == REVOLUTE and free else 1.0 if free else 0.5 for j in robot.joints])
     centre = np.array([start.get(j, 0.0) for j in robot.joints])
-    n, D = len(robot.joints), np.empty((0, len(robot.joints), len(robot.parameters)))
+    n = len(robot.joints)
+    state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
     for _ in range(DRAWS):
         q, qd, qdd = centre + reach * rng.uniform(-1, 1, (states, n)), *rng.standard_normal((2, states, n))
         block = model.actuated_regressor(q, qd, qdd)
-        D = np.concatenate([D, block[np.isfinite(block).all(axis=(1, 2))]])[:states]
+        closed = np.isfinite(block).all(axis=(1, 2))
+        D = np.concatenate([D, block[closed]])[:states]
+        state = np.concatenate([state, np.array([q, qd, qdd])[:, closed]], axis=1)[:, :states]
         if len(D) == states:
-            break
-    else:
-        raise DescriptionError(
-            f"{robot.name}: the loops close in {len(D)} of {DRAWS * states} random states near their start; give each loop a `start` that closes it",
-            path=("loops",),
-        )
-    return D.transpose(1, 0, 2).reshape(n * len(D), -1), robot.parameters
+            return Sample(model, *state, D)
+    raise DescriptionError(
+        f"{robot.name}: the loops close in {len(D)} of {DRAWS * states} random states near their start; give each loop a `start` that closes it",
+        path=("loops",),
+    )
+
+
+def numeric_regressor(
+    robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None
+) -> tuple[Array, tuple[str, ...]]:
+    """W of `states` random states as `sampled` draws them, shape (n*states, p), rows joint-major, and the names of its columns."""
+    return sampled(robot, states, seed, constants).W, robot.parameters
+
+
+def in_one_mode(robot: Robot) -> Robot:
+    """`robot` with its passive joints declared where they are linear in the actuated ones: no state lies in an antiparallelogram.
+
+    The dynamics by energies still closes every loop itself and refuses states in which the declared joints do not close it.
+    """
+    closure = close(robot)
+    if closure.tied:
+        return robot
+    declared = {j: sum((g * Expression.symbol(f"q{i}") for i, g in closure.row[j].items()), closure.offset[j]) for j in robot.passive}
+    return replace(robot, constraints=declared)

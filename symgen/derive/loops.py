@@ -220,7 +220,12 @@ def _angle_sum(robot: Robot, loop: Loop, configuration: Mapping[int, float]) -> 
     if robot.frame(loop.cut).sigma != REVOLUTE:
         return None
     branches = [(sign, robot.path(k)) for sign, k in ((1, loop.twin), (-1, loop.cut))]
-    hinges = [(sign, j) for k, (sign, path) in enumerate(branches) for j in path if robot.frame(j).sigma == REVOLUTE and j not in branches[1 - k][1]]
+    hinges = [
+        (sign, j)
+        for k, (sign, path) in enumerate(branches)
+        for j in path
+        if robot.frame(j).sigma == REVOLUTE and j not in branches[1 - k][1]
+    ]
     total: dict[int, int] = {}
     for shift in (0.0, 0.3):
         q = {j: np.asarray(x + shift * k) for k, (j, x) in enumerate(configuration.items())}

@@ -193,7 +193,15 @@ class Expression:
         for m, c in sorted(self.terms.items(), key=lambda mc: _order(mc[0])):
             term: Any = number(c)
             for a, n in m:
-                base = function(a.function, a.argument) if isinstance(a, Call) else value(a) if isinstance(a, str) else kept(a) if kept else number(a.value)
+                base = (
+                    function(a.function, a.argument)
+                    if isinstance(a, Call)
+                    else value(a)
+                    if isinstance(a, str)
+                    else kept(a)
+                    if kept
+                    else number(a.value)
+                )
                 factor = base
                 for _ in range(abs(n) - 1):
                     factor = factor * base

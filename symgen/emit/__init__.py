@@ -7,7 +7,7 @@ from symgen.emit.c_target import has_c_target
 from symgen.emit.casadi_target import CasadiText
 from symgen.emit.render import render, render_c, render_casadi, render_xp
 from symgen.emit.spec import module_spec
-from symgen.regroup.regrouping import regroup
+from symgen.regroup.regrouping import Regrouping, regroup
 
 __all__ = ["TARGETS", "generate_files", "generate_module"]
 
@@ -19,9 +19,14 @@ def generate_module(robot: Robot, *, command: str | None = None) -> str:
     return render(module_spec(regroup(robot)), command=command)
 
 
-def generate_files(robot: Robot, *, targets: Sequence[str] = ("numpy",), command: str | None = None) -> dict[str, str]:
-    """{file name: text} of every target; CasADi, C and xp are left out where the joints are tied by closure equations alone."""
-    regrouping, files = regroup(robot), {}
+def generate_files(
+    robot: Robot, *, targets: Sequence[str] = ("numpy",), command: str | None = None, regrouping: Regrouping | None = None
+) -> dict[str, str]:
+    """{file name: text} of every target; CasADi, C and xp are left out where the joints are tied by closure equations alone.
+
+    regrouping : that of `robot`, where it is known already.
+    """
+    regrouping, files = regrouping or regroup(robot), {}
     spec = module_spec(regrouping)
     for target in targets:
         if target == "numpy":

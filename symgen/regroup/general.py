@@ -187,7 +187,9 @@ class FloatStates:
         while found < count:
             tried += count
             if tried > MOST_STATES + 10 * count:
-                raise SymgenError(f"robot {self.robot.name}: the loops close in {found} of {tried} states near the start; give each loop a `start` that closes it")
+                raise SymgenError(
+                    f"robot {self.robot.name}: the loops close in {found} of {tried} states near the start; give each loop a `start` that closes it"
+                )
             block = self._block(names, count)
             rows.append(block)
             found += block.shape[1]
@@ -218,7 +220,9 @@ class FloatStates:
         qdd |= {u: bend[:, a] + sum(rates[:, a, k] * qdd[i] for k, i in enumerate(joints)) for a, u in enumerate(closure.tied)}
         rate = {(u, i): rates[:, a, k] for a, u in enumerate(closure.tied) for k, i in enumerate(joints)}
         D = columns(Motion(Geometry(self.robot, FloatAlgebra(self.robot, q, qd, qdd, rate), closure)), names)
-        return np.stack([np.stack([np.broadcast_to(np.asarray(D[name].get(j, 0), dtype=float), (size,)) for name in names], axis=-1) for j in joints])
+        return np.stack(
+            [np.stack([np.broadcast_to(np.asarray(D[name].get(j, 0), dtype=float), (size,)) for name in names], axis=-1) for j in joints]
+        )
 
     def _linearised(self, q: Mapping[int, Array]) -> tuple[Array, Array]:
         """Residuals (samples, m) and their derivatives by the independent joints (samples, m, n + m)."""
@@ -302,7 +306,12 @@ def _products(lengths: Sequence[Length], degree: int) -> list[tuple[Length, ...]
 
 
 def _nullspace(
-    robot: Robot, name: str, support: tuple[str, ...], Q: list[tuple[Length, ...]], products: Mapping[str, list[tuple[Length, ...]]], width: int
+    robot: Robot,
+    name: str,
+    support: tuple[str, ...],
+    Q: list[tuple[Length, ...]],
+    products: Mapping[str, list[tuple[Length, ...]]],
+    width: int,
 ) -> dict[str, Expression] | None:
     n = len(robot.joints)
     draw = closed_draw(robot, 13, -(-(width + 8) // n) + 2)
@@ -337,7 +346,7 @@ def _nullspace(
     return {k: e * denominator.inverse() for k, e in sides.items() if e}
 
 
-def identities(robot: Robot, K: Mapping[str, Mapping[str, Expression]], own: Sequence[str], seed: int, *, p: int | None = None) -> list[str]:
+def identities(robot: Robot, K: Mapping[str, Mapping[str, Expression]], seed: int, *, p: int | None = None) -> list[str]:
     """Standard columns that are not what K says at random points of V. Raises ArithmeticError where V is not drawn."""
     draw = closed_draw(robot, seed, 3, p=p)
     names = robot.parameters

@@ -19,14 +19,15 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from symgen.derive.loops import close
 from symgen.description.expression import ONE, Expression
 from symgen.description.robot import Element, Robot
+from symgen.emit.certified import certify
 from symgen.emit.header import informative_columns
 from symgen.emit.spec import ModuleSpec, module_spec, unit
-from symgen.regroup.certificate import Certificate, certify
+from symgen.regroup import mathml
+from symgen.regroup.certificate import Certificate
+from symgen.regroup.mathml import MathML
 from symgen.regroup.regrouping import Regrouping
-from symgen.report import mathml
 from symgen.report.effects import Effect, effects
 from symgen.report.figure import figure, passive_text
-from symgen.report.mathml import MathML
 from symgen.version import VERSION
 
 SCRIPTS = ("kinematics.js", "drawing.js", "page.js")
@@ -44,9 +45,22 @@ class Verbatim(str):
         return self
 
 
-def robot_page(regrouping: Regrouping) -> str:
-    """HTML text. Same robot file, same version: same bytes. Raises SymgenError where a length has no value."""
-    spec, certificate = module_spec(regrouping), certify(regrouping)
+def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -> str:
+    """HTML text of the page of a robot. Same robot file, same version: same bytes.
+
+    Parameters
+    ----------
+    regrouping : Regrouping
+        Base parameters with their formulas.
+    certificate : Certificate, optional
+        Their certificate; made where left out.
+
+    Raises
+    ------
+    SymgenError
+        A length has no value.
+    """
+    spec, certificate = module_spec(regrouping), certificate or certify(regrouping)
     robot, found = spec.robot, effects(spec)
     style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS))
     drawing = figure(robot)
@@ -68,7 +82,7 @@ def robot_page(regrouping: Regrouping) -> str:
         formulas=_formulas(spec),
         places=_places(found),
         without=_without_effect(found),
-        costs=[(name.replace("_", " "), getattr(spec, name)) for name in MODELS if getattr(spec, name) is not None],
+        costs=[(name.replace("_", " "), function) for name, function in spec.functions.items()],
         certificate=certificate,
         version=VERSION,
     )
@@ -139,8 +153,8 @@ def _formulas(spec: ModuleSpec) -> list[dict[str, Any]]:
         {
             "name": b.name,
             "symbol": mathml.math(mathml.parameter(b.name)),
-            "terms": mathml.formula(b.combination) if b.name != b.own else [],
-            "text": b.formula,
+            "terms": mathml.formula(b.formula) if b.name != b.own else [],
+            "text": str(b.formula),
             "unit": printed(unit(robot, b.own)),
             "joints": [(j, entered) for j, entered in zip(robot.joints, spec.structure[k], strict=True)],
         }

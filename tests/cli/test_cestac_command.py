@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from campaign import campaign
 import typer
 from typer.testing import CliRunner
 
@@ -37,6 +38,7 @@ def test_coarse_encoder_is_biased(emps_data):
     assert {"e_rho", "e_rho_own", "increase"} <= set(found["levels"][0])
 
 
+@campaign
 def test_workers_give_the_same_bits(emps_data):
     one, two = (json.loads(run("emps", "emps", "--delta", "1e-6", "--runs", 2, "--workers", w, "--json").stdout) for w in (1, 2))
     assert one["levels"] == two["levels"]
@@ -104,6 +106,7 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(emps_data, tmp_p
     assert json.loads((tmp_path / "cestac.json").read_text())["levels"] == json.loads(run(*arguments[:-2], "--json").stdout)["levels"]
 
 
+@campaign
 def test_many_runs_stay_in_their_archives(tmp_path, emps_data):
     """2 steps of 501 runs: more than cestac.json lists."""
     result = run("emps", "emps", "--delta", "1e-6", "--delta", "1e-7", "--runs", 501, "--columns", "M1R", "-o", tmp_path)

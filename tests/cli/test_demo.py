@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from campaign import campaign
 import typer
 from typer.testing import CliRunner
 
@@ -42,6 +43,7 @@ def _refused(url, output_file, pooch):
     raise OSError("no network in this test")
 
 
+@campaign
 def test_offline_is_labelled_everywhere(offline):
     result, out = offline
     assert result.exit_code == 0, result.output
@@ -58,6 +60,7 @@ def test_offline_is_labelled_everywhere(offline):
     assert "http://" not in html and "https://" not in html and html.count("<script") == 2
 
 
+@campaign
 def test_offline_recovers_what_was_put_in(offline):
     """The large parameters of the robot file, from a noisy record of 4 s."""
     _, out = offline
@@ -82,6 +85,7 @@ def test_simulated_trajectory_keeps_the_limits():
     assert 0.2 < steady.mean() < 0.5  # constant velocity in the middle of every piece
 
 
+@campaign
 def test_measured_record(tx40_data):
     """Tables 2 and 3 within their tolerances, and every table of the report; one test, since the demo runs once."""
     with opened_model("tx40") as model:

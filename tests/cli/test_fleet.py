@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import campaign
 import typer
 from typer.testing import CliRunner
 
@@ -85,6 +86,7 @@ def test_one_folder_per_job_and_the_table(shown, folder):
     assert found[1]["status"] == "failed" and found[1]["rows"] is None
 
 
+@campaign
 def test_processes_give_the_same_table(shown, folder, emps_data):
     again = run(folder / "fleet.yaml", "--workers", 2, "--json")
     assert again.exit_code == 1

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from runtime.result_files import write_all
 from symgen.cli.generate import emitted
 from symgen.cli.main import app
-from symgen.cli.writing import write_all
 from symgen.description import packaged_robots, skeleton
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -53,6 +53,22 @@ def test_own_robot_from_any_folder(tmp_path, monkeypatch):
     assert found.stdout.strip() == "(5, 2, 13)"
     assert [p.name for p in (tmp_path / "deep" / "models").iterdir() if p.suffix == ".py"] == ["arm.py"]
     assert str(tmp_path) not in (tmp_path / "deep" / "models" / "arm.py").read_text()
+
+
+MJCF = """<mujoco model="arm"><worldbody><body name="link"><joint name="hinge" axis="0 0 1"/>
+<inertial pos="0 0 0.1" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("file", ["arm.YAML", "arm.Yml", "arm.xml", "arm.MJCF"])
+def test_no_folder_of_this_machine_in_emitted_files(tmp_path, file):
+    """Suffixes in capitals and MJCF: the command of the header once held the whole path."""
+    if file.lower().endswith(("xml", "mjcf")):
+        pytest.importorskip("mujoco")
+    (tmp_path / file).write_text(MJCF if file.lower().endswith(("xml", "mjcf")) else skeleton("arm"))
+    result = run(tmp_path / file, "-o", tmp_path / "out", "--target", "numpy,casadi,c,xp")
+    assert result.exit_code == 0, result.output
+    for path in (tmp_path / "out").iterdir():
+        assert str(tmp_path) not in path.read_text() and f"symgen generate {file}" in path.read_text()
 
 
 def test_default_folder_is_generated(tmp_path, monkeypatch):

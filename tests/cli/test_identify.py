@@ -6,14 +6,15 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from campaign import campaign
 import typer
 from typer.testing import CliRunner
 
 from runtime.estimators.estimate import Estimate
+from runtime.result_files import write_all
 from runtime.settings.files import load_study
 from symgen.cli.identify import identify
 from symgen.cli.main import app
-from symgen.cli.writing import write_all
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 FILES = {"report.html", "estimate.json", "estimate.mat", "estimate.npz", "parameters.csv", "parameters.tex"}
@@ -196,6 +197,7 @@ def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
     assert run("emps", tmp_path / "study.yaml", "--block", "3").exit_code == 2
 
 
+@campaign
 def test_report_says_what_its_figures_leave_out(tx40_data, tmp_path, monkeypatch):
     monkeypatch.setattr("runtime.observation.by_blocks.SHOWN", 300)
     assert run("tx40", "tx40", "--block", 20000, "-o", tmp_path).exit_code == 0

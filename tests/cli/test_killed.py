@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from symgen.cli.writing import FINISHED, LOCK, UNFINISHED, OutputError, reserved, write_all
+from runtime.result_files import FINISHED, LOCK, UNFINISHED, OutputError, reserved, write_all
 
 NAMES = ("a.txt", "b.txt", "c.txt")
 OLD, NEW = dict.fromkeys(NAMES, "old"), dict.fromkeys(NAMES, "new")
@@ -168,5 +168,5 @@ print(*sys.modules)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert not {name.partition(".")[0] for name in done.stdout.split()} & {"numpy", "runtime", "casadi", "matplotlib"}
+    assert not {name.partition(".")[0] for name in done.stdout.split()} & {"numpy", "scipy", "casadi", "matplotlib"}
     assert [path.name for path in tmp_path.iterdir()] == ["file"] and (tmp_path / "file").read_text() == "mine"

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime.settings.files import load_study
@@ -62,6 +63,7 @@ def test_record_that_determines_nothing(record, tmp_path):
     assert "✕</span> No" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
+@campaign
 def test_encoders_at_the_motors(emps_data, tmp_path):
     """The step of --encoder is one of the motors where --side says so, in the words of the verdict and in study.yaml."""
     result = run("emps", "emps", "-o", tmp_path / "out", "--encoder", "1e-6", "--side", "motor")

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from runtime import load_model, study_from_mapping
+from runtime import load_model
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential
 from runtime.identification.record_errors import record_errors
 from runtime.observation.by_blocks import reduce_records
 from runtime.records.reading_by_blocks import open_streams
+from runtime.settings.study import study_from_mapping
 from symgen.cli.main import app
 
 RATE = 500

@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 
 from symgen.cli.formula_text import STYLES, FormulaText, terms
 from symgen.cli.main import app
-from symgen.cli.show import recursive_formulas
 from symgen.description import load_robot
 from symgen.regroup.regrouping import regroup
-from symgen.report.symbols import SUBSCRIPTS, SUPERSCRIPTS, subscripted
+from symgen.report.formulas import recursive_formulas
+from symgen.regroup.symbols import SUBSCRIPTS, SUPERSCRIPTS, subscripted
 
 pty = pytest.importorskip("pty")
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")

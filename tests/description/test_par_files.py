@@ -81,7 +81,7 @@ def test_packaged_robots_keep_their_formulas(name):
     assert dict(again.values) == {p: v for p, v in robot.values.items() if p not in lost}
     kept = replace(robot, elements=again.elements, values={}, drives=None)
     assert again.elements == kept.elements  # with the above: the same mechanism
-    if name != "five_bar":  # several seconds; what its formulas are derived from is equal already
+    if name not in ("four_bar", "five_bar"):  # several seconds; what their formulas are derived from is equal already
         assert formulas(again) == formulas(kept) and formulas(kept)
 
 

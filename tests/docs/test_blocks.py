@@ -1,29 +1,39 @@
-"""Every ```python and ```sh block of README and docs runs as it stands, page by page, in one empty folder per page; ```yaml blocks are read.
+"""README and docs: the default run checks what every block names and runs the examples and two pages; the campaign runs every block of every page.
 
-A page becomes one script: its Python blocks share a namespace, its commands run with `symgen` on PATH, a YAML block whose first line is
-`# NAME.yaml` is written to that file. `# exit code 1` at the end of a block of commands says what its last command ends with. ```text is not run.
+A page becomes one script in an empty folder: its Python blocks share a namespace, its commands run with `symgen` on PATH, a YAML block whose first
+line is `# NAME.yaml` is written to that file. `# exit code 1` at the end of a block of commands says what its last command ends with. ```text is not run.
 """
 
 from __future__ import annotations
 
+import ast
 import os
 import re
+import runpy
+import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from campaign import campaign
 from ruamel.yaml import YAML
+from typer.main import get_command
 
 from runtime.settings.files import settings_from_text, study_from_text
 from symgen.cli.fleet_jobs import FleetSettings
+from symgen.cli.main import app
 from symgen.description.schema import RobotFile
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
 FENCE = re.compile(r"^```(?P<kind>python|sh|yaml)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
+SOON = ("README", "tools")  # pages that the default run runs
 BY_CI = "python3 -m venv"  # blocks that .ci/run takes from the README and runs itself
 RUN = """
 def sh(text, code):
@@ -73,7 +83,7 @@ def script(page: Path) -> str:
 def run(command: list[str], folder: Path) -> None:
     environment = os.environ | {
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-        "PYTHONPATH": str(folder),
+        "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}",
         "MPLBACKEND": "Agg",
         "HTTPS_PROXY": "http://127.0.0.1:9",  # no page needs the network where the records are at hand
     }
@@ -88,7 +98,10 @@ def needs_record(text: str) -> list[str]:
     return [name for name in ("tx40", "emps") if re.search(rf"{name} {name}\b|record: {name}|record_of\(\"{name}|symgen demo", text)]
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if any(b.kind != "yaml" for b in blocks(p))], ids=lambda p: p.stem)
+RUNNING = [p for p in PAGES if any(b.kind != "yaml" for b in blocks(p))]
+
+
+@pytest.mark.parametrize("page", [p if p.stem in SOON else pytest.param(p, marks=campaign) for p in RUNNING], ids=lambda p: p.stem)
 def test_blocks_of_a_page_run(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     text = script(page)
     for name in needs_record(text):
@@ -99,12 +112,49 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path, request: pytest.Fixtur
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
-def test_examples_run(example: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    text = example.read_text(encoding="utf-8")
-    assert text.count("\n") < 50
-    for name in needs_record(text):
-        request.getfixturevalue(f"{name}_data")
-    run([sys.executable, str(example)], tmp_path)
+def test_examples_run(example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """In this process: what an example imports is there already."""
+    assert example.read_text(encoding="utf-8").count("\n") < 50
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(example), run_name="__main__")
+    assert capsys.readouterr().out
+
+
+def python_texts() -> Iterator[tuple[str, str]]:
+    """(place, text) of every Python block and of every example."""
+    for page in PAGES:
+        yield from ((f"{page.name}, line {b.line}", b.text) for b in blocks(page) if b.kind == "python")
+    yield from ((path.name, path.read_text(encoding="utf-8")) for path in EXAMPLES)
+
+
+def test_python_blocks_import_what_exists() -> None:
+    for place, text in python_texts():
+        for node in ast.walk(ast.parse(text, place)):
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.partition(".")[0] in ("symgen", "runtime"):
+                for alias in node.names:
+                    known = hasattr(import_module(node.module), alias.name) or find_spec(f"{node.module}.{alias.name}")
+                    assert known, f"{place}: {node.module} has no {alias.name}"
+            elif isinstance(node, ast.Import):
+                for alias in node.names:
+                    assert alias.name.partition(".")[0] not in ("symgen", "runtime") or find_spec(alias.name), f"{place}: {alias.name}"
+
+
+def test_commands_of_blocks_are_those_of_the_program() -> None:
+    """Verb, arguments and options of every `symgen` command are what its parser takes; nothing runs."""
+    group = get_command(app)
+    seen = 0
+    for page in PAGES:
+        for block in (b for b in blocks(page) if b.kind == "sh"):
+            for words in (shlex.split(line, comments=True) for line in block.text.splitlines() if line.startswith("symgen ")):
+                verb, arguments = words[1], [word for word in words[2:] if word not in ("&&", "||")]
+                command = group.get_command(None, verb)  # type: ignore[attr-defined, arg-type]
+                assert command is not None, f"{page.name}, line {block.line}: no verb {verb}"
+                try:
+                    command.make_context(verb, arguments)
+                except Exception as e:
+                    raise AssertionError(f"{page.name}, line {block.line}: symgen {verb}: {e}") from e
+                seen += 1
+    assert seen > 30
 
 
 def test_yaml_blocks_are_what_the_program_reads() -> None:

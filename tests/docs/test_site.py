@@ -15,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 from browser import started_browser
+from campaign import campaign
 
 import runtime
 import symgen
@@ -28,6 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SHOWN = ("index.html", "guide/my_robot.html", "theory/cestac.html", "reference/gallery.html", "reference/study_file.html", "api/index.html")
 
 
+@campaign
 def test_site(tmp_path: Path) -> None:
     """One test, since each process that tests would build a site of its own."""
     site = built(tmp_path)

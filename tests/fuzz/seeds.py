@@ -226,7 +226,7 @@ def estimate_file() -> bytes:
     from hashlib import sha256
 
     from runtime.estimators import estimate
-    from runtime.model.text import ModelText  # a model from text, checked like any file
+    from runtime.model.generated import ModelText  # a model from text, checked like any file
     from runtime.observation.observation import observe, stack
     from runtime.records.record import Record
     from runtime.settings.study import study_from_mapping

@@ -4,12 +4,14 @@ import secrets
 from pathlib import Path
 
 import pytest
+from campaign import FULL, campaign
 
 from fuzz.formats import FORMATS
 from fuzz.harness import Reader, case, run
 
 CORPUS = Path(__file__).parent / "corpus"
-CASES = 2000  # of the fixed seed, and half as many of a fresh one
+CASES = 200  # of all formats in the default run
+MORE = 40000 if FULL else 3000  # of a campaign: a third of the fixed seed, the others of one that was never tried
 
 
 @pytest.fixture(scope="module")
@@ -25,14 +27,23 @@ def test_corpus(reader, path):
     assert not outcome.fault, outcome
 
 
-@pytest.mark.parametrize("name", FORMATS)
-@pytest.mark.parametrize(("seed", "share"), [(1, 1.0), (None, 0.5)])
-def test_cases(reader, name, seed, share):
-    """Seed 1, and one that was never tried: what it finds is told by its number."""
-    seed = secrets.randbits(32) if seed is None else seed
-    count = int(share * CASES * FORMATS[name].share / sum(x.share for x in FORMATS.values()))
+def faultless(reader, name, seed, cases):
+    """So many cases of all formats, those of one; a fault is told by the number of its case."""
+    count = -(-cases * FORMATS[name].share // sum(x.share for x in FORMATS.values()))
     for number, _, outcome in run(reader, name, seed, range(count)):
         assert not outcome.fault, f"python -m fuzz {name} --seed {seed} --first {number} --cases 1: {outcome}"
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_cases(reader, name):
+    faultless(reader, name, 1, CASES)
+
+
+@campaign
+@pytest.mark.parametrize("name", FORMATS)
+def test_many_cases(reader, name):
+    faultless(reader, name, 1, MORE // 3)
+    faultless(reader, name, secrets.randbits(32), 2 * MORE // 3)
 
 
 def test_a_case_is_told_by_its_number():

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from bag_files import KINDS, joint_states, write_bag
 
-from runtime import read_record, study_from_mapping
+from runtime import read_record
 from runtime.errors import InputError
 from runtime.records.formats.bags import read_bag
 from runtime.records.reading_by_blocks import are_large, open_stream
+from runtime.settings.study import study_from_mapping
 
 N, RATE = 40, 200
 STAMPS = 1_700_000_000_123_456_789 + np.arange(N) * (10**9 // RATE)

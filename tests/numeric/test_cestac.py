@@ -13,13 +13,12 @@ from scipy.stats import t
 from runtime.errors import InputError, ModelError, SettingsError
 from runtime.estimators import estimate
 from runtime.model.drives import Drives
-from runtime.model.text import ModelText
+from runtime.model.generated import ModelText
 from runtime.observation.filters import filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, select_rows
 from runtime.resolution.cestac import cestac, key_blocks, levels_of
-from runtime.resolution.result import Level, deciding_names, level_result, runs_needed
-from runtime.resolution.run import perturbed_position, perturbed_torque
-from runtime.resolution.runs import Run, Runs
+from runtime.resolution.perturbed import perturbed_position, perturbed_torque
+from runtime.resolution.result import Level, Run, Runs, deciding_names, level_result, runs_needed
 from runtime.settings.study import CestacSettings, EstimateSettings, Lowpass, Signals, Study
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20))

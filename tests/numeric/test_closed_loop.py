@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime import InputError, SettingsError, load_model, read_records, study_from_mapping
+from runtime import InputError, load_model
+from runtime.errors import SettingsError
 from runtime.estimators import estimate
 from runtime.estimators import fixed_point as iteration
 from runtime.estimators.closed_loop import closed_loop, slips, slowest
@@ -17,7 +18,8 @@ from runtime.motion.reference import Reference, reference_of
 from runtime.motion.simulation import Simulator, parameters_of
 from runtime.observation.observation import observe
 from runtime.records.datasets import dataset_study
-from runtime.settings.study import EstimateSettings
+from runtime.records.reading import read_records
+from runtime.settings.study import EstimateSettings, study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 SIMULATING = ("iv", "didim", "cloe")

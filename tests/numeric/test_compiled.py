@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime import GeneratedModel, load_model
+from runtime import load_model
 from runtime.errors import InputError
 from runtime.model.compiled import CompiledModel, FallbackWarning, cache_folder, compiled_model
+from runtime.model.generated import GeneratedModel
 from symgen.description import load_robot, parse_robot
 from symgen.emit import generate_files
 

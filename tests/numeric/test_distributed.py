@@ -67,6 +67,7 @@ def test_same_bits_as_one_process(cluster):
     assert calls[-1] == (24, 24) and len(calls) == 8
 
 
+@pytest.mark.campaign
 def test_a_worker_killed_halfway_changes_nothing(cluster):
     killed = []
 
@@ -79,6 +80,7 @@ def test_a_worker_killed_halfway_changes_nothing(cluster):
     assert killed and there.to_json() == cestac(planar, RECORD, STUDY).to_json()
 
 
+@pytest.mark.campaign
 def test_a_dead_worker_loses_nothing(cluster, tmp_path):
     found = sorted(results(dying_once, tmp_path, range(20), cluster.scheduler_address))
     assert found == [(key, tmp_path) for key in range(20)]

@@ -124,7 +124,7 @@ def test_torque_limits_hold(planar: tuple) -> None:
     free = search(planar, settings())
     largest = np.abs(model.inverse_dynamics(*free.motion.sampled(1000.0)[1:], X)).max(axis=0)
     asked = settings(
-        limits={**LIMITS, "tau": (0.8 * largest).tolist()}, torque_rms=(0.5 * largest).tolist(), smooth=0.02, iterations=200, starts=2
+        limits={**LIMITS, "tau": (0.8 * largest).tolist()}, torque_rms=(0.5 * largest).tolist(), smooth=0.02, iterations=200
     )
     found = search(planar, asked)
     tau = model.inverse_dynamics(*found.motion.sampled(1000.0)[1:], X)

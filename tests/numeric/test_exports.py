@@ -22,8 +22,7 @@ from runtime.estimators.estimate import Estimate, load_estimate
 from runtime.json_documents import KINDS, schema_text
 from runtime.latex import escaped, level_cell, name_cell, number_cell, unit_cell
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays, mat, matlab_names, npz
-from runtime.resolution.result import Cestac, Level, level_result
-from runtime.resolution.runs import Run, Runs
+from runtime.resolution.result import Cestac, Level, Run, Runs, level_result
 
 HOSTILE = ("\\input{/etc/passwd}", "a%b", "$x$ & ^^M # ~ _", "\\end{tabular}\\write18{ls}", "é Δ 中\n\x00\u202e", "{", 'end"<b>|')
 NUMBERS = ("X", "sigma", "covariance", "sigma_corrected", "relative_sigma")

@@ -11,17 +11,20 @@ import pytest
 from scipy.optimize import minimize
 
 from oracles.pinocchio_model import PinocchioModel
-from runtime import InputError, SettingsError, observe, read_records, study_from_mapping
+from runtime import InputError, observe
+from runtime.errors import SettingsError
 from runtime.estimators import estimate
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import Ellipsoid, Limits, feasibility, limit_rows, standard_parameters
-from runtime.estimators.feasible import Options, linear, residual_norm, weighed
-from runtime.estimators.physical import INERTIAL, negative_elements, physical_model, pseudo_inertia
+from runtime.estimators.feasible import FeasibleOptions, linear, residual_norm, weighed
+from runtime.estimators.physical import negative_elements
 from runtime.identification.validation import split_validation
 from runtime.model.generated import load_model
+from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.observation.observation import Observation
 from runtime.records.datasets import dataset_study
-from runtime.settings.study import EstimateSettings
+from runtime.records.reading import read_records
+from runtime.settings.study import EstimateSettings, study_from_mapping
 from symgen.description import load_robot
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -107,7 +110,7 @@ def test_feasible_is_least_squares_where_that_is_feasible(name: str) -> None:
     ols, found = estimate(seen), estimate(seen, FEASIBLE, model=model)
     assert found.details["least_squares"]["feasible"]
     np.testing.assert_array_equal(found.X, ols.X)
-    physical, options = physical_model(model), Options(margin=1e-9)
+    physical, options = physical_model(model), FeasibleOptions(margin=1e-9)
     chi, weight = weighed(linear(seen, FEASIBLE, options).weighted, physical, options)
     assert weight == 0 and np.abs((physical.K @ chi - ols.X) / ols.sigma).max() < 1e-2
 
@@ -339,5 +342,5 @@ def test_tx40_record(tx40, tx40_data) -> None:
     for split in (study.validate.split, study.validate.split[::-1]):  # each half predicts the other better than by least squares
         errors = [split_validation(seen, split, how, model=tx40).predictions[1].relative_error for how in (EstimateSettings(), FEASIBLE)]
         assert errors[1] < 0.98 * errors[0]
-    system = linear(seen, FEASIBLE, Options())
+    system = linear(seen, FEASIBLE, FeasibleOptions())
     assert residual_norm(system.weighted, found.X) == pytest.approx(found.residual_norm, rel=1e-9)

@@ -7,15 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime import InputError, Record, observe, read_records, study_from_mapping
+from runtime import InputError, Record, observe
 from runtime.estimators import estimate
 from runtime.identification.friction import friction_curves, own_friction
 from runtime.identification.friction_laws import correlation_time
 from runtime.model.generated import load_model
 from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
 from runtime.reporting import figures as plots
 from runtime.reporting.friction import friction_figure, friction_section
 from runtime.reporting.page import Page, render
+from runtime.settings.study import study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0

@@ -12,18 +12,17 @@ from scipy.signal import decimate
 from oracles.random_robots import random_robot
 from runtime.errors import InputError, ModelError
 from runtime.model.compile_cache import FallbackWarning, cache_folder
-from runtime.model.compiled import CompiledModel
+from runtime.model.compiled import CompiledModel, text_of
 from runtime.model.drives import Drives
-from runtime.model.text import ModelText
+from runtime.model.generated import ModelText
 from runtime.observation.filters import filtered_states
 from runtime.observation.observation import decimated_torque, select_rows
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
-from runtime.resolution.c import cestac_run as fused_cestac
 from runtime.resolution.cestac import cestac
-from runtime.resolution.run import perturbed_position
-from runtime.resolution.runs import NORMAL, TRIANGULAR
+from runtime.resolution.perturbed import perturbed_position
+from runtime.resolution.result import NORMAL, TRIANGULAR
 from runtime.settings.study import CestacSettings, Decimate, EstimateSettings, Lowpass, Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
 
@@ -124,7 +123,7 @@ def test_workers_give_the_same_bits(planar):
 
 
 def test_a_model_travels_as_text(planar, monkeypatch):
-    text = fused_cestac.CompiledText.of(planar)
+    text = text_of(planar)
     assert isinstance(text, ModelText) and text.load().NAME == planar.NAME
     with pytest.raises(ModelError, match="not the one that was sent"):
         replace(text, text=text.text + " ").load()

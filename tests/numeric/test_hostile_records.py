@@ -17,9 +17,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import get_types_from_msg
 
-from runtime import read_record, study_from_mapping
+from runtime import read_record
 from runtime.errors import InputError
 from runtime.records.formats.bags import read_bag
+from runtime.settings.study import study_from_mapping
 
 ALWAYS = 2**24  # bytes that any file may unpack to, here
 BEYOND = ALWAYS + 2**20

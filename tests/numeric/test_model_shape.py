@@ -206,6 +206,32 @@ CASADI = [
     "class A(ca.Callback):\n    a = 1",
 ]
 ARRAYS = [
+    "import numpy as np",
+    "import array_api_compat",
+    "from array_api_compat import *",
+    "from array_api_compat import numpy",
+    "from array_api_compat.torch import load",
+    "from torch import load",
+    "def f(x):\n    from array_api_compat import array_namespace",
+    "def f(x):\n    return array_namespace(x).load('a')",
+    "def f(x):\n    xp = array_namespace(x)\n    return xp.save(x, 'a')",
+    "def f(x):\n    y = array_namespace(x)\n    return y.hub",
+    "def f(x):\n    xp = array_namespace(x)\n    return xp.ops.load_library('a')",
+    "def f(x):\n    return array_namespace(x).linalg.lapack",
+    "def f(x):\n    return array_namespace(x).from_dlpack(x)",
+    "def f(m):\n    return m.dump('a')\ndef g(x):\n    return f(array_namespace(x))",
+    "def f(x):\n    return x.tofile('a')",
+    "def f(x):\n    return x.data",
+    "def f(x):\n    return x.numpy()",
+    "def f(x):\n    return x.__array_namespace__()",
+    "f = array_namespace",
+    "x = array_namespace.__globals__",
+    "def f(g=array_namespace):\n    return g(1).load",
+    "def array_namespace(x):\n    return x",
+    "def f(array_namespace):\n    return array_namespace(1)",
+    "x = open('a')",
+    "x = getattr(array_namespace(1), 'load')",
+    "x = np.zeros(3)",
     "def f(x):\n    array_namespace(x).sin = 1",
     "def f(x):\n    return array_namespace(x).save",
     "def f(x):\n    return array_namespace(x).numpy",
@@ -222,6 +248,25 @@ ARRAYS = [
 def test_files_that_would_do_more_than_arithmetic(package, text):
     with pytest.raises(ModelError, match=r"a\.py"):
         check_source(HEADS[package] + text + "\n", "a.py")
+
+
+def test_a_module_has_one_array_package():
+    for text in ("x = array_namespace(1)", "from array_api_compat import array_namespace"):
+        with pytest.raises(ModelError, match=r"a\.py"):
+            check_source(HEADS["np"] + text + "\n", "a.py")
+
+
+def test_array_modules_an_emitter_may_write():
+    text = "def f(x, *, a=1.0):\n    xp = array_namespace(x)\n    return xp.where(x > 0.0, a*xp.cos(x), -x[..., 0])\n"
+    check_source(HEADS["xp"] + text, "a.py")
+
+
+def test_an_array_module_is_no_model(monkeypatch):
+    with pytest.raises(ModelError, match=r"no store; expected an emitted model"):
+        load_model(EMITTED / "tx40_xp.py")
+    monkeypatch.setitem(sys.modules, "array_api_compat", None)
+    with pytest.raises(ModelError, match=r"pip install symgen\[gpu\]"):
+        load_model(EMITTED / "tx40_xp.py")
 
 
 def test_they_are_refused_before_they_run(tmp_path):

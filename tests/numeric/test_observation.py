@@ -12,12 +12,12 @@ import pytest
 import scipy.signal
 from planar_data import TRUE, motion
 
-from runtime import Record, load_model, observe, stack, study_from_mapping
+from runtime import Record, load_model, observe
 from runtime.errors import InputError
 from runtime.observation.filters import States, decimated, filtered_states
-from runtime.observation.observation import decimated_torque, observation_from_states, select_rows
+from runtime.observation.observation import decimated_torque, observation_from_states, select_rows, stack
 from runtime.observation.regressor_signals import decimated_columns, distinct_entries, signals_of
-from runtime.settings.study import Decimate
+from runtime.settings.study import Decimate, study_from_mapping
 
 RATE, N = 1000.0, 6000
 T = np.arange(N) / RATE

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime import InputError, Record, SettingsError, observe, study_from_mapping
+from runtime import InputError, Record, observe
+from runtime.errors import SettingsError
 from runtime.estimators import estimate
-from runtime.estimators.physical import INERTIAL, physical_model
 from runtime.identification.drive_gains import drive_gains
 from runtime.identification.payload import payload, payload_difference
 from runtime.model.generated import load_model
-from runtime.settings.study import EstimateSettings, PayloadSettings
+from runtime.model.inertia import INERTIAL, physical_model
+from runtime.settings.study import EstimateSettings, PayloadSettings, study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0

@@ -41,6 +41,7 @@ def test_a_dead_process_loses_nothing(tmp_path):
     assert (tmp_path / "died").exists()
 
 
+@pytest.mark.campaign
 def test_processes_that_always_die():
     with pytest.raises(InputError, match="died 3 times before any of 2 tasks"):
         list(results(always_dying, None, range(2), 1))
@@ -52,7 +53,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
            "    for pid in results(test_processes.waiting, None, [0.0, 60.0], 1):\n        print(pid, flush=True)\n"  # fmt: skip
     script = tmp_path / "script.py"
     script.write_text(code)
-    here = str(Path(__file__).parent)
+    here = os.pathsep.join([str(Path(__file__).parent), str(Path(__file__).parents[2])])
     process = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": here})
     worker = int(process.stdout.readline())
     process.kill()

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 import scipy.io
 
-from runtime import Drives, Record, read_record, read_records
+from runtime import Record, read_record
 from runtime.errors import InputError, SettingsError
+from runtime.model.drives import Drives
+from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import open_stream
 from runtime.settings.study import RecordSettings, study_from_mapping
 

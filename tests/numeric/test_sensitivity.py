@@ -73,7 +73,7 @@ def test_six_joints_with_the_coupled_wrist():
     }
     settings = structure(Controller, {"law": law, "rate": 5000, "reference": {"points": {"duration": 1.2}}})
     whole = reference_of(settings, tx40)
-    reference = replace(whole, q=whole.q[:3000], qd=whole.qd[:3000], qdd=whole.qdd[:3000])
+    reference = replace(whole, q=whole.q[:1500], qd=whole.qd[:1500], qdd=whole.qdd[:1500])
     truth = parameters_of(tx40, settings)
-    columns = [tx40.BASE_PARAMETERS.index(name) for name in ("ZZ1R", "FV2", "FS3", "MX2R", "FSM6", "XY4")]
+    columns = [tx40.BASE_PARAMETERS.index(name) for name in ("ZZ1R", "FS3", "MX2R", "FSM6")]
     agree(Simulator(tx40, settings), truth, reference, columns, 1e-3)

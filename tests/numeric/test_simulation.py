@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import campaign
 from scipy.integrate import solve_ivp
 
-from runtime import InputError, SettingsError, load_model, read_records, study_from_mapping
+from runtime import InputError, load_model
+from runtime.errors import SettingsError
 from runtime.model.casadi import load_symbolic
 from runtime.motion.control_law import control_law, discrete_poles
 from runtime.motion.controller_tick import plant_function
@@ -19,8 +21,10 @@ from runtime.motion.result import SimulationError
 from runtime.motion.simulation import Simulator, inertia_ratio, parameters_of, simulate
 from runtime.observation.filters import filtered_states
 from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
 from runtime.settings.controller import Controller
 from runtime.settings.schema import structure
+from runtime.settings.study import study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 GTAU = 35.15065188248547  # N/V
@@ -113,6 +117,7 @@ def test_against_scipy(tx40, truth):
     assert np.abs(found.q[-1] - rest[0]).max() > 1e-2  # it moved
 
 
+@campaign
 def test_against_cvodes_and_substeps(tx40, truth):
     """The same loop by CVODES and by more substeps: the flow between two ticks is exact to 1e-7."""
     settings = controller()

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from oracles.pinocchio_model import PinocchioModel
-from runtime import Record, observe, study_from_mapping
+from runtime import Record, observe
 from runtime.estimators import estimate
 from runtime.model.generated import load_model
+from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit import generate_module
 

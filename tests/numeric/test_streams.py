@@ -10,17 +10,19 @@ import numpy as np
 import planar_2r_model as planar
 import pytest
 
-from runtime import Drives, load_model, observe, read_record, read_records, study_from_mapping
+from runtime import load_model, observe, read_record
 from runtime.errors import InputError, SettingsError
 from runtime.estimators import estimate
 from runtime.estimators.essential import essential
 from runtime.identification.validation import cross_validation, split_validation, weak_directions
+from runtime.model.drives import Drives
 from runtime.observation.by_blocks import halves, reduce_records
 from runtime.observation.observation import stack
 from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import are_large, open_stream
 from runtime.records.stream import RecordStream
-from runtime.settings.study import EstimateSettings, RecordSettings
+from runtime.settings.study import EstimateSettings, RecordSettings, study_from_mapping
 
 N, RATE = 1003, 500.0
 DRIVES = Drives([[30.0, 0.0], [12.0, -20.0]], [0.1, -0.2], [0.5, 0.4])

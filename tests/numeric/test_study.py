@@ -7,7 +7,8 @@ import pytest
 from runtime.errors import InputError, SettingsError
 from runtime.records.datasets import DATASETS, dataset_study
 from runtime.settings.arithmetic import number
-from runtime.settings.files import load_study, study_from_text, study_of
+from runtime.records.named import study_of
+from runtime.settings.files import load_study, study_from_text
 from runtime.settings.study import Study, study_from_mapping, to_mapping
 
 DESIGN = """
@@ -85,19 +86,19 @@ def test_one_record_or_several():
         ({"signals": {"median": 4}}, ("signals", "median"), "odd window"),
         ({"signals": {"median": 2.5}}, ("signals", "median"), "expected an integer"),
         ({"signals": {"lowpass": {"cutoff": "fast"}}}, ("signals", "lowpass", "cutoff"), "expected a number"),
-        ({"signals": {"lowpass": {"cutoff": -1}}}, ("signals", "lowpass", "cutoff"), "positive"),
+        ({"signals": {"lowpass": {"cutoff": -1}}}, ("signals", "lowpass", "cutoff"), "expected more than 0"),
         ({"signals": {"lowpass": {"on": ["qdd"]}}}, ("signals", "lowpass", "on", 0), "expected q or qd"),
-        ({"signals": {"decimate": {"factor": 0}}}, ("signals", "decimate", "factor"), "auto or an integer"),
+        ({"signals": {"decimate": {"factor": 0}}}, ("signals", "decimate", "factor"), "0; expected at least 1 or auto"),
         ({"rows": {"window": [1, 0]}}, ("rows", "window"), "the earlier time first"),
-        ({"rows": {"window": [1]}}, ("rows", "window"), "expected 2"),
+        ({"rows": {"window": [1]}}, ("rows", "window"), "1 values; expected at least 2"),
         ({"rows": {"low_speed": "slow"}}, ("rows", "low_speed"), "expected a number"),
-        ({"estimate": {"method": "magic"}}, ("estimate", "method"), "expected ols or wls"),
-        ({"essential": {"threshold": 1}}, ("essential", "threshold"), "above 1"),
+        ({"estimate": {"method": "magic"}}, ("estimate", "method"), "expected ols, wls, irls, tls, iv, didim, cloe or feasible"),
+        ({"essential": {"threshold": 1}}, ("essential", "threshold"), "expected more than 1"),
         ({"record": [{"files": "a"}, {"side": "left"}]}, ("record", 1, "side"), "expected motor or joint"),
         ({"record": {"rate": True}}, ("record", "rate"), "expected a number"),
         ({"record": {"units": {"q": "counts"}}}, ("record", "counts_per_revolution"), "counts need it"),
         ({"cestac": {"runs": 1}}, ("cestac", "runs"), "at least 2"),
-        ({"cestac": {"delta": [1e-3, float("inf")]}}, ("cestac", "delta", 1), "expected a number"),
+        ({"cestac": {"delta": [1e-3, float("inf")]}}, ("cestac", "delta", 1), "inf; expected a finite number"),
         ({"symgen": 2}, ("symgen",), "this version reads 1"),
         ({"validate": {"split": [[0, 1]]}}, ("validate", "split"), "at least two"),
     ],

@@ -10,14 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runtime import observe, read_record, read_records, study_from_mapping
+from runtime import observe, read_record
 from runtime.errors import InputError
 from runtime.identification.identification import coupling_fits
+from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import are_large, open_stream, records_or_streams
 from runtime.records.record import Record
 from runtime.records.resampling import resampled
 from runtime.records.time_stamps import time_stamps
-from runtime.settings.study import Resample
+from runtime.settings.study import Resample, study_from_mapping
 
 RATE = 500.0
 T = np.arange(2000) / RATE

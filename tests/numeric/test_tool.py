@@ -10,9 +10,10 @@ import pytest
 from test_payload import BOX, emitted, observe, record
 from test_payload import STUDY as PAYLOAD_STUDY
 
-from runtime import InputError, SettingsError, load_model
-from runtime.estimators.physical import INERTIAL, physical_model, pseudo_inertia
+from runtime import InputError, load_model
+from runtime.errors import SettingsError
 from runtime.identification.payload import payload
+from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.model.mount import load_effect, load_of_body, mount, ten_parameters
 from runtime.settings.study import PayloadSettings
 from symgen.description import load_robot, parse

@@ -5,17 +5,8 @@ import numpy as np
 import pytest
 
 from runtime.errors import InputError, SettingsError
-from runtime.settings.trajectories import (
-    FAMILIES,
-    Fourier,
-    Motion,
-    Part,
-    PointToPoint,
-    Sinusoids,
-    Triangular,
-    family_from_mapping,
-    motion_from_mapping,
-)
+from runtime.settings.families import FAMILIES, Fourier, PointToPoint, Sinusoids, Triangular, family_from_mapping
+from runtime.settings.trajectories import Motion, Part, motion_from_mapping
 
 EVERY = [Fourier(4.0, 3, 2), Sinusoids(5.0, 3, 0.8, 0.7), PointToPoint(5, 1.1, 0.25), Triangular(4, 1.5, 0.3, 0.4)]
 

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from runtime import Drives, filtered_states, read_record, study_from_mapping
+from runtime import read_record
+from runtime.model.drives import Drives
+from runtime.observation.filters import filtered_states
 from runtime.records.datasets import dataset_study
+from runtime.settings.study import study_from_mapping
 
 RATIO = np.diag([32.0, 32, 45, -48, 45, 32])
 RATIO[5, 4] = 32  # motor 6 turns with joint 5 as well

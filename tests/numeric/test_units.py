@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runtime import Drives, read_record, study_from_mapping
+from runtime import read_record
 from runtime.errors import InputError, SettingsError
+from runtime.model.drives import Drives
+from runtime.settings.study import study_from_mapping
 from runtime.settings.units import GRAMMAR, SI, TABLE, position_unit, speed, time_unit, torque_unit
 
 OURS = {"counts", "count", "°", "Nm", "mNm", "rev"}
@@ -131,10 +133,10 @@ def test_degrees_and_milliampere(tmp_path):
 
 def test_pint_is_loaded_only_where_it_is_needed():
     code = (
-        "import sys, runtime\n"
-        "runtime.study_from_mapping({'record': {'units': {'q': 'deg', 'tau': 'mA', 't': 'ms'}}})\n"
+        "import sys\nfrom runtime.settings.study import study_from_mapping\n"
+        "study_from_mapping({'record': {'units': {'q': 'deg', 'tau': 'mA', 't': 'ms'}}})\n"
         "assert 'pint' not in sys.modules\n"
-        "runtime.study_from_mapping({'record': {'units': {'q': 'mrad'}}})\n"
+        "study_from_mapping({'record': {'units': {'q': 'mrad'}}})\n"
         "assert 'pint' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -26,7 +26,7 @@ from symgen.description.grammar import parse
 from symgen.description.robot import REVOLUTE, Robot
 from symgen.emit.render import render
 from symgen.emit.spec import module_spec
-from symgen.regroup.certificate import certify
+from symgen.regroup.certificate import certify_formulas
 from symgen.regroup.regrouping import RECOGNISED, Regrouping, regroup
 
 Array = np.ndarray[Any, Any]
@@ -143,7 +143,7 @@ def test_module_against_multipliers(name: str, emitted: Emitted) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_certificate(name: str) -> None:
-    certificate = certify(regrouped(name))
+    certificate = certify_formulas(regrouped(name))
     assert certificate.valid, certificate.failures
 
 
@@ -310,5 +310,5 @@ def test_certificate_catches_a_wrong_coefficient(own: str, standard: str) -> Non
             replace(b, combination={k: c * factor if (b.own, k) == (own, standard) else c for k, c in b.combination.items()})
             for b in regrouping.base
         )
-        certificate = certify(replace(regrouping, base=base))
+        certificate = certify_formulas(replace(regrouping, base=base))
         assert not certificate.valid and any(standard in failure for failure in certificate.failures)

@@ -17,7 +17,7 @@ from symgen.description.expression import ONE
 from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, Element, Frame
 from symgen.errors import DescriptionError
-from symgen.regroup.certificate import certify
+from symgen.regroup.certificate import certify_formulas
 from symgen.regroup.regrouping import BaseParameter, Regrouping, regroup
 
 # chapter, Table 6: the names with an R, fC as FS
@@ -162,8 +162,8 @@ def test_four_bar() -> None:
     assert "M3" in found.no_effect and "MX3" not in found.own
     k = found.names.index("MX2R")
     wrong = BaseParameter("MX2R", "MX2", {**found.base[k].combination, "MX3": -found.base[k].combination["MX3"]})
-    assert certify(found).valid
-    assert not certify(replace(found, base=(*found.base[:k], wrong, *found.base[k + 1 :]))).valid
+    assert certify_formulas(found).valid
+    assert not certify_formulas(replace(found, base=(*found.base[:k], wrong, *found.base[k + 1 :]))).valid
 
 
 ON_A_TURRET = """\
@@ -187,7 +187,7 @@ def test_column_that_rounding_alone_fills_is_zero() -> None:
     """A right angle is not exact in 60 digits: MZ2 has no effect, and its column is 1e-60."""
     found = regroup(parse_robot(ON_A_TURRET.encode(), "turret.yaml"))
     assert "MZ2" in found.no_effect
-    assert certify(found).valid
+    assert certify_formulas(found).valid
 
 
 def test_five_bar() -> None:
@@ -212,12 +212,12 @@ def test_five_bar() -> None:
 @pytest.mark.parametrize("name", ["haptic", "sr400"])
 def test_certified_and_every_perturbed_coefficient_caught(name: str) -> None:
     regrouping = regrouped(name)
-    assert certify(regrouping).valid
+    assert certify_formulas(regrouping).valid
     for k, b in enumerate(regrouping.base):
         for parameter, c in b.combination.items():
             if parameter != b.own:
                 wrong = BaseParameter(b.name, b.own, {**b.combination, parameter: c * 2})
-                assert not certify(replace(regrouping, base=(*regrouping.base[:k], wrong, *regrouping.base[k + 1 :]))).valid, (
+                assert not certify_formulas(replace(regrouping, base=(*regrouping.base[:k], wrong, *regrouping.base[k + 1 :]))).valid, (
                     b.name,
                     parameter,
                 )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from runtime import load_model
-from symgen import Robot, certify, generate_module, parse_robot, regroup
+from symgen import Robot, certify, generate_module, parse_robot, regrouping
 from symgen.derive.exact import Draw, Fp
 from symgen.derive.lagrange import numeric_regressor
 from symgen.description.expression import Expression, call
@@ -62,16 +62,16 @@ def test_roots_of_one_field_obey_its_relations(seed: int) -> None:
 @pytest.mark.parametrize(("alpha", "r"), [("pi/6", "sqrt(3)/2"), ("pi/4", "sqrt(2)/2"), ("pi/5", "sqrt(5)"), ("pi/3", "sqrt(12)")])
 def test_the_emitted_regressor_is_that_of_lagrange(alpha: str, r: str, tmp_path: Path) -> None:
     described = robot(alpha, r)
-    regrouping = regroup(described)
-    assert certify(regrouping).valid
+    base = regrouping(described)
+    assert certify(base).valid
     path = tmp_path / "same.py"
     path.write_text(generate_module(described))
     model = load_model(path)
     W, names = numeric_regressor(described, 40, seed=5)
     chi = np.random.default_rng(6).standard_normal(len(names))
     value = dict(zip(names, chi, strict=True))
-    X = np.array([sum(c.value(described.constants) * value[p] for p, c in b.combination.items()) for b in regrouping.base])
-    own = W[:, [names.index(name) for name in regrouping.own]]
+    X = np.array([sum(c.value(described.constants) * value[p] for p, c in b.combination.items()) for b in base.base])
+    own = W[:, [names.index(name) for name in base.own]]
     assert np.abs(own @ X - W @ chi).max() < 1e-10 * np.abs(W @ chi).max()
     q, qd, qdd = np.random.default_rng(1).uniform(-1, 1, (3, 50, 3))
     by_regressor = model.regressor(q, qd, qdd) @ X

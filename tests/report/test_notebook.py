@@ -12,8 +12,7 @@ from nbclient import NotebookClient
 
 from runtime.estimators.estimate import Estimate, JointFit
 from runtime.observation.observation import Observation
-from runtime.resolution.result import Cestac, Level, level_result
-from runtime.resolution.runs import Run, Runs
+from runtime.resolution.result import Cestac, Level, Run, Runs, level_result
 from symgen.description import load_robot
 from symgen.regroup.regrouping import regroup
 
@@ -49,7 +48,7 @@ def test_estimate_is_a_table():
     shown = fit()._repr_html_()
     ElementTree.fromstring(shown)
     page = Elements(shown)
-    assert "<span>ZZ<sub>1R</sub></span>" in shown and "kg m²" in page.text and "10.00" in page.text and "error 2.50 %" in page.text
+    assert "<var>ZZ<sub>1R</sub></var>" in shown and "kg\xa0m²" in page.text and "10.000" in page.text and "relative error 2.500 %" in page.text
     assert {tag for tag, _ in page.tags} <= {
         "div",
         "p",
@@ -60,7 +59,7 @@ def test_estimate_is_a_table():
         "tr",
         "th",
         "td",
-        "span",
+        "var",
         "sub",
         "details",
         "summary",
@@ -109,8 +108,8 @@ def test_a_notebook_shows_them():
     """Run in a kernel: both results come as HTML and LaTeX beside the text."""
     book = nbformat.v4.new_notebook()
     book.cells = [
-        nbformat.v4.new_code_cell("import symgen\nsymgen.regroup(symgen.load_robot('planar_2r'))"),
-        nbformat.v4.new_code_cell("from runtime.reporting.notebook import symbol\nprint(symbol('ZZ1R'))"),
+        nbformat.v4.new_code_cell("import symgen\nsymgen.regrouping(symgen.load_robot('planar_2r'))"),
+        nbformat.v4.new_code_cell("from runtime.markup import symbol\nprint(symbol('ZZ1R'))"),
     ]
     NotebookClient(book, timeout=120, kernel_name="python3").execute()
     data = book.cells[0].outputs[0]["data"]

@@ -1,4 +1,4 @@
-/* Inner loops of identification and of resolution studies, for any robot whose C file gives its distinct signals.
+/* Inner loops of resolution studies, for any robot whose C file gives its distinct signals.
 
     fused_states      median-filtered positions -> q, qd: low-pass forward and backward, central differences (runtime/observation/filters.py)
     fused_gather      rows of q, qd, qdd from these
@@ -6,7 +6,6 @@
     fused_normal      rows -> A_j = [W_j Y_j]'[W_j Y_j] of every joint on its own columns
     fused_residual    rows, X -> W_j'(Y_j - W_j X) and ||Y_j - W_j X||^2: one refinement
     fused_rows        rows of [W_j Y_j] themselves, column by column, for a QR
-    fused_stream      states -> signals -> one of the last three, by blocks
 
 Signals are rows of samples, U[s*stride + t]; entry e of joint j is sign[e]*U[signal[e]]. All memory comes from the caller and nothing is kept
 between calls, so any number of threads may work, each on its own arrays. Functions return 0, 1 for arguments that cannot be, 2 where the
@@ -119,8 +118,6 @@ int32_t fused_decimated(const struct states *states, const struct source *from, 
 int32_t fused_normal(const struct entries *a, const struct rows *r);
 int32_t fused_residual(const struct entries *a, const struct rows *r, const double *X);
 int32_t fused_rows(const struct entries *a, const struct rows *r);
-int32_t fused_stream(int32_t task, const struct source *from, const struct entries *a, int64_t N, int64_t step, int64_t ustride,
-                     const double *const given[4], const double *X);
 int32_t fused_abi(void);
 void fused_layout(int64_t layout[8]);
 
@@ -408,31 +405,6 @@ int32_t fused_normal(const struct entries *a, const struct rows *r)
 int32_t fused_residual(const struct entries *a, const struct rows *r, const double *X)
 {
     work(RESIDUAL, a, r, X);
-    return 0;
-}
-
-/* The same tasks, or the rows for a QR, on N samples of states and torques given (N, n), `step` at a time: from->U has whole tiles for them,
-from->rows is (4, n, ustride) here. */
-int32_t fused_stream(int32_t task, const struct source *from, const struct entries *a, int64_t N, int64_t step, int64_t ustride,
-                     const double *const given[4], const double *X)
-{
-    if (task < NORMAL || task > ROWS || N < 0 || step < 1 || ustride < step || (task == ROWS && N > a->most))
-        return 1;
-    for (int64_t t = 0; t < N; t += step) {
-        const int64_t m = N - t < step ? N - t : step, size = a->n*ustride;
-        for (int k = 0; k < 4; k++)
-            for (int64_t i = 0; i < m; i++)
-                for (int64_t j = 0; j < a->n; j++)
-                    from->rows[k*size + j*ustride + i] = given[k][(t + i)*a->n + j];
-        for (int64_t p = 0; p < m; p += from->tile) {
-            const double *q = from->rows + p;
-            const int64_t part = m - p < from->tile ? m - p : from->tile;
-            if (from->signals(part, q, q + size, q + 2*size, ustride, from->constants, from->U + p*from->count, from->tile))
-                return 2;
-        }
-        const struct rows some = {m, from->tile, from->count, ustride, 0, from->U, from->rows + 3*size, NULL};
-        work((enum task)task, a, &some, X);
-    }
     return 0;
 }
 

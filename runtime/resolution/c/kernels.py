@@ -4,7 +4,7 @@
     Entries(model, names)                                   which signals stand where in the wanted columns
     decimated(entries, states, samples, ...)                kept samples of the wanted signals; the signals are not stored
 
-Least squares on these rows, and on states that are streamed: `runtime.resolution.c.least_squares`.
+Least squares on these rows: `runtime.resolution.c.least_squares`.
 
 The same matrices and the same order of operations as the NumPy path where that costs nothing: filtered states agree with scipy's in every bit on
 x86-64, the rest to rounding. Nothing is allocated in C; `Room` holds what calls reuse, one for each thread.
@@ -106,7 +106,7 @@ def _opened(path: Path) -> ctypes.CDLL:
         abi = found.fused_abi()
         found.fused_layout.restype = None
         found.fused_layout(layout)
-        for name in ("states", "gather", "decimated", "normal", "residual", "rows", "stream"):
+        for name in ("states", "gather", "decimated", "normal", "residual", "rows"):
             getattr(found, f"fused_{name}").restype = ctypes.c_int32
     except AttributeError as e:
         raise NotCompiledError(f"{SOURCE.name} is not the one of this version: {e}") from e

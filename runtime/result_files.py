@@ -21,7 +21,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from pathlib import Path
 from typing import overload
 
-from symgen.errors import SymgenError
+from runtime.errors import InputError
 
 try:
     import fcntl
@@ -44,7 +44,7 @@ ADVICE = {
 }
 
 
-class OutputError(SymgenError):
+class OutputError(InputError):
     """Results that cannot be written: where, why, what to do."""
 
 
@@ -88,22 +88,23 @@ class Results:
             shutil.rmtree(unfinished)
 
 
-def write_all(folder: Path, contents: Mapping[str, str | bytes]) -> list[Path]:
+def write_all(folder: str | Path, contents: Mapping[str, str | bytes]) -> list[Path]:
     """Write every file into `folder`, or none, after whoever is just writing there; their paths."""
+    folder = Path(folder)
     with _made(folder), _locked(folder, PATIENCE):
         return Results(folder).write_all(contents)
 
 
 @overload
-def reserved(folder: Path) -> AbstractContextManager[Results]: ...
+def reserved(folder: str | Path) -> AbstractContextManager[Results]: ...
 @overload
-def reserved(folder: Path | None) -> AbstractContextManager[Results | None]: ...
-def reserved(folder: Path | None) -> AbstractContextManager[Results | None]:
+def reserved(folder: str | Path | None) -> AbstractContextManager[Results | None]: ...
+def reserved(folder: str | Path | None) -> AbstractContextManager[Results | None]:
     """Keep other commands out of `folder`, made where it is missing, as long as the block lasts; None: nothing is to be written.
 
     Raises OutputError at once where another command holds the folder, or nothing can be written there.
     """
-    return nullcontext() if folder is None else _reserved(folder)
+    return nullcontext() if folder is None else _reserved(Path(folder))
 
 
 @contextmanager

@@ -1,0 +1,73 @@
+"""The workspace of a compiled model: filters, signals, decimation and least squares of `runtime.resolution.c.kernels` in place of NumPy's.
+
+The same draws as with NumPy and the same estimates to rounding; the same bits for the same seed on one kind of machine, whoever works. Only
+perturbed positions go in and small matrices come out; room is reused from run to run.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import cast
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.estimators.normal_equations import LeastSquares
+from runtime.model.compile_cache import FallbackWarning
+from runtime.model.compiled import CompiledModel
+from runtime.model.generated import GeneratedModel
+from runtime.resolution.c import kernels
+from runtime.resolution.c.least_squares import KeptRows, least_squares
+from runtime.resolution.c.self_test import unavailable
+from runtime.resolution.perturbed import PreparedRecord, Task, perturbed_position, stream_keys, torque_rows
+from runtime.resolution.result import Level
+from runtime.resolution.rounding import bits, stream
+
+Array = np.ndarray
+
+
+def usable(model: GeneratedModel) -> GeneratedModel:
+    """`model`, or the NumPy module of a compiled one, with a FallbackWarning saying why, where the kernels of studies cannot be had."""
+    if isinstance(model, CompiledModel) and (reason := unavailable()):
+        warnings.warn(f"{model.NAME}: NumPy in place of C: {reason}", FallbackWarning, stacklevel=3)
+        return model.module
+    return model
+
+
+class CompiledWorkspace:
+    """What one thread keeps from run to run of one task."""
+
+    def __init__(self, task: Task, model: CompiledModel) -> None:
+        self.task, self.compiled, self.entries = task, model, kernels.Entries(model, task.names)
+        self.constants = kernels.constant_values(model, task.constants)
+        self.room = kernels.Room()
+        self.records = [(record, np.asfortranarray(record.q), kernels.Room()) for record in task.records]
+        self.two_point = task.settings.rounding == "two-point" and (task.settings.side == "joint" or task.drives is None)
+
+    @property
+    def model(self) -> GeneratedModel:
+        """The model, its regressor in C."""
+        return cast(GeneratedModel, self.compiled)
+
+    def fit(self, level: Level, draw: tuple[int, ...]) -> LeastSquares:
+        """Ordinary least squares of Y on W_CESTAC of one draw, eq. (17)."""
+        rows = []
+        for k, (record, q, room) in enumerate(self.records):
+            position, torque = stream_keys(draw, k)
+            y = self._signals(record, q, level, position, room)
+            rows.append((y, torque_rows(self.task, record, level, torque), record.selection.mask))
+        return least_squares(KeptRows(self.entries, rows, self.room))
+
+    def _signals(self, record: PreparedRecord, q: Array, level: Level, key: tuple[int, ...], room: kernels.Room) -> Array:
+        """Distinct signals of the wanted columns at the kept samples, shape (S, K)."""
+        settings, selection = self.task.settings, record.selection
+        if self.two_point and level.delta and selection.signals.median == 1:  # the sum is left to C
+            up = bits(q.shape, stream(settings.seed, *key))
+            states = kernels.FilteredStates(q, record.rate, selection.signals, room, up=up, step=level.delta)
+        else:
+            moved = perturbed_position(q, level, settings, self.task.drives, key)
+            states = kernels.FilteredStates(moved, record.rate, selection.signals, room)
+        y = kernels.decimated(self.entries, states, selection.samples, selection.factor, selection.signals.decimate, self.constants, room)
+        if not np.isfinite(y).all():
+            raise InputError(f"the regressor of {self.compiled.NAME} is not finite at perturbed positions; use smaller steps")
+        return y

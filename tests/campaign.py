@@ -1,0 +1,23 @@
+"""Campaigns: checks over hundreds of cases. The default run takes a seeded sample of each; `pytest -m campaign` runs the rest.
+
+SYMGEN_FULL=1 multiplies what a campaign draws anew (fuzz cases, seeds); CONTRIBUTING.md says what each costs.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+
+FULL = os.environ.get("SYMGEN_FULL") == "1"
+campaign = pytest.mark.campaign
+
+
+def sampled(cases: Iterable[Any], count: int, *, always: Iterable[Any] = ()) -> list[Any]:
+    """Parameters of a test: `count` cases drawn with a fixed seed, and those of `always`, run by default; the others are a campaign."""
+    listed = list(cases)
+    kept = {*random.Random(0).sample(range(len(listed)), count), *(listed.index(case) for case in always)}
+    return [case if k in kept else pytest.param(case, marks=campaign) for k, case in enumerate(listed)]
