@@ -265,7 +265,7 @@ class Draw:
             if self._roots_exist():
                 break
         self._rate: dict[tuple[int, int], Array] = {}
-        self._directions: dict[tuple[tuple[int, bytes], ...], Array] = {}
+        self._directions: dict[tuple[tuple[int, tuple[int, ...]], ...], Array] = {}
         self._q = {j: self._random(samples) for j in robot.moving}
         self._qd = {j: self._random(samples) for j in robot.moving}
         self._qdd = {j: self._random(samples) for j in robot.moving}
@@ -414,8 +414,8 @@ class Draw:
         """b of the direction class of a row, and whether the row runs along (1) or against (-1) it."""
         lead = row[0][1]
         orientation = 1 if lead.value(self.robot.constants) > 0 else -1
-        ratios = [(self._residues(g) * power(self._residues(lead), self.p - 2, self.p) % self.p).tobytes() for _, g in row]
-        key = tuple((i, ratio) for (i, _), ratio in zip(row, ratios, strict=True))
+        inverse = power(self._residues(lead), self.p - 2, self.p)
+        key = tuple((i, tuple(np.unique(self._residues(g) * inverse % self.p))) for i, g in row)
         if key not in self._directions:
             self._directions[key] = self._random(self.samples)
         b = self._fp(self._directions[key])
