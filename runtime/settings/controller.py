@@ -195,7 +195,7 @@ class Controller(Settings):
 
     law: Law = field(default_factory=Law)
     rate: Positive = 1000.0
-    delay: Annotated[Whole, Field(ge=0, le=1)] = 0
+    delay: Literal[0, 1] = 0
     velocity: Literal["difference", "averaged"] = "difference"
     feedforward: Literal["none", "values"] = "none"
     encoder: Encoder = field(default_factory=Encoder)

@@ -22,7 +22,8 @@ from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
 from symgen.derive.kinematics import frame_poses
 from symgen.description.expression import ONE, PI, ZERO, Expression
-from symgen.description.robot import REVOLUTE, Loop, Robot, row_of
+from symgen.description.forms import row_of
+from symgen.description.robot import REVOLUTE, Loop, Robot
 from symgen.errors import DescriptionError
 
 Array = np.ndarray

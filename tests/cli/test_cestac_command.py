@@ -54,7 +54,7 @@ def test_torque_steps_and_named_columns(emps_data):
     ("options", "words"),
     [
         (["--delta", "foo"], ["cestac.delta", "foo"]),
-        (["--delta", "-1"], ["cestac.delta", "positive"]),
+        (["--delta", "-1"], ["cestac.delta", "more than 0"]),
         (["--runs", "1"], ["cestac.runs", "at least 2"]),
         (["--rounding", "up"], ["cestac.rounding", "two-point"]),
         (["--side", "left"], ["cestac.side", "motor"]),

@@ -52,7 +52,7 @@ ARM = {
 def arm(tmp_path_factory):
     """Model, settings, simulator, truth and reference of the planar arm."""
     from symgen import load_robot
-    from symgen.emit import generate_files
+    from symgen.emit.generate import generate_files
 
     folder = tmp_path_factory.mktemp("arm")
     for name, text in generate_files(load_robot("planar_2r"), targets=("numpy", "casadi")).items():
@@ -222,7 +222,7 @@ def test_what_is_missing_is_said(arm, clean, method):
     plain = observe(model, clean[0], study)
     with pytest.raises(SettingsError, match="give a section `controller`"):
         estimate(plain, EstimateSettings(method), model=model)
-    for options, said in (({"passes": 0}, "expected a positive number"), ({"start": "cad"}, "cad"), ({"speed": 1}, "speed")):
+    for options, said in (({"passes": 0}, "passes: 0; expected at least 1"), ({"start": "cad"}, "cad"), ({"speed": 1}, "speed")):
         with pytest.raises(SettingsError, match=said):
             estimate(clean[1], EstimateSettings(method, options=options), model=model)
 

@@ -260,7 +260,7 @@ def test_json_keeps_the_standard_parameters(arm) -> None:
         ({"bounds": {"mass": [0, 1]}}, "no standard parameter mass"),
         ({"centre": {"9": [[0, 1], [0, 1], [0, 1]]}}, "no link '9'"),
         ({"ellipsoid": {"1": {"centre": [0, 0, 0], "axes": [1, 0, 1]}}}, r"ellipsoid\.1\.axes"),
-        ({"prior": "cad"}, "euclidean or entropic"),
+        ({"prior": "cad"}, "expected none, euclidean, entropic or pullback"),
         ({"margin": 0}, "margin"),
         ({"weight": 1.0}, "set prior"),
         ({"pull": 1}, "unknown key pull"),

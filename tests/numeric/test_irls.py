@@ -104,7 +104,7 @@ def test_rank_loss_and_bad_options():
     lost = replace(seen, W=np.column_stack([seen.W[:, 0], seen.W[:, :-1]]))
     assert estimate(lost, HUBER).status == "rank-deficient"
     assert estimate(with_outliers(), EstimateSettings(method="irls", options={"passes": 1})).status == "not-converged"
-    for options, words in (({"loss": "cauchy"}, "huber"), ({"tuning": -1}, "positive"), ({"k": 1}, "tuning")):
+    for options, words in (({"loss": "cauchy"}, "huber"), ({"tuning": -1}, "tuning: -1; expected more than 0"), ({"k": 1}, "tuning")):
         with pytest.raises(SettingsError, match=words):
             estimate(seen, EstimateSettings(method="irls", options=options))
     with pytest.raises(SettingsError, match="its own weights"):

@@ -378,11 +378,11 @@ def test_reference_files(emps, tmp_path):
 def test_settings_are_checked():
     for given, said in (
         ({"law": {"kind": "cascade", "kp": 1, "kd": 1}}, "controller.law.kd: 1.0; a cascade law has no such gain"),
-        ({"delay": 2}, "controller.delay: 2 ticks; expected 0 or 1"),
+        ({"delay": 2}, "controller.delay: 2; expected 0 or 1"),
         ({"reference": {"record": 0, "points": {}}}, "record and points; expected one of"),
-        ({"encoder": {"step": -1}}, "expected positive numbers"),
-        ({"torque": {"noise": -1}}, "expected 0 or more"),
-        ({"settle": 1e9}, "expected 0 to 60 s"),
+        ({"encoder": {"step": -1}}, "encoder.step: -1; expected more than 0"),
+        ({"torque": {"noise": -1}}, "torque.noise: -1; expected at least 0"),
+        ({"settle": 1e9}, "controller.settle: 1000000000.0; expected at most 60"),
         ({"velocity": "filtered"}, "expected difference or averaged"),
     ):
         with pytest.raises(SettingsError, match=said.replace(".", r"\.")):

@@ -157,9 +157,9 @@ def test_bad_settings():
     seen, _ = disturbed(C3)
     for settings, words in (
         (EstimateSettings("tls"), "position_error"),
-        (tls(position_error=-1.0), "positive"),
+        (tls(position_error=-1.0), "position_error: -1.0; expected at least 0"),
         (tls(position_error=1.0, torque_error=(1.0, 1.0, 1.0)), "one or 2"),
-        (tls(position_error=1.0, torque_error=0.0), "positive"),
+        (tls(position_error=1.0, torque_error=0.0), "torque_error: 0.0; expected more than 0"),
         (tls("covariance", position_error=1.0), "covariance"),
         (tls(position_error=1.0, step=2), "step"),
     ):
