@@ -301,7 +301,9 @@ def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, fl
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
     start = {j: x for loop in robot.loops for j, x in loop.start.items()}
     free = not robot.loops or set(robot.passive) <= set(robot.constraints)
-    reach = np.array([np.pi if robot.frame(j).sigma == REVOLUTE and free else 1.0 if free else 0.5 for j in robot.joints])
+    longest = max([abs(e.value(model.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)], default=0.0)
+    slide = 1.0 if free else min(0.5, longest / 4)
+    reach = np.array([(np.pi if free else 0.5) if robot.frame(j).sigma == REVOLUTE else slide for j in robot.joints])
     centre = np.array([start.get(j, 0.0) for j in robot.joints])
     n = len(robot.joints)
     state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
@@ -333,6 +335,6 @@ def in_one_mode(robot: Robot) -> Robot:
     """
     closure = close(robot)
     if closure.tied:
-        return robot
+        return replace(robot, loops=tuple(replace(loop, start=dict(closure.start)) for loop in robot.loops))
     declared = {j: sum((g * Expression.symbol(f"q{i}") for i, g in closure.row[j].items()), closure.offset[j]) for j in robot.passive}
     return replace(robot, constraints=declared)

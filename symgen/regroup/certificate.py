@@ -23,10 +23,9 @@ import numpy as np
 
 from symgen.derive.exact import Array, Draw, Fp, primes_for
 from symgen.derive.loops import close
-from symgen.description.expression import ZERO, Expression
 from symgen.description.robot import Robot
 from symgen.regroup.finite_field import rref
-from symgen.regroup.general import FloatStates, float_states, identities
+from symgen.regroup.general import closed_draw
 from symgen.regroup.regrouping import NUMERIC, Regrouping
 from symgen.regroup.solve import sample, states_for
 
@@ -153,77 +152,73 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
         The loops close in too few random states.
     """
     robot = regrouping.robot
-    exact = _general(regrouping, seed) if close(robot).tied else _over_primes(regrouping, seed, sampler)
     witness, rank, gap = independent(robot)
-    chi = np.random.default_rng(6).standard_normal(len(robot.parameters))
-    tau, base = witness.W @ chi, [robot.parameters.index(own) for own in regrouping.own]
-    error = float(np.abs(tau - witness.W[:, base] @ base_values(regrouping, chi)).max() / np.abs(tau).max())
-    return Certificate(robot.name, regrouping.method, len(regrouping), *exact, numeric_rank=rank, numeric_gap=gap, torque_error=error)
-
-
-Exact = tuple[int, tuple[int, ...], int, tuple[str, ...]]  # rank, primes, identities, failures
-
-
-def _over_primes(regrouping: Regrouping, seed: int, sampler: Sampler) -> Exact:
-    robot = regrouping.robot
+    base = [robot.parameters.index(own) for own in regrouping.own]
     primes = primes_for(robot, 2)
-    index = {name: c for c, name in enumerate(robot.parameters)}
-    failures: list[str] = []
-    ranks: list[int] = []
-    for k, p in enumerate(primes):
-        draw = Draw(robot, seed + k, states_for(robot, robot.parameters), p=p)
-        W = sampler(draw, robot.parameters)
-        base = W[:, [index[name] for name in regrouping.own]]
-        ranks.append(len(rref(base, p)[0]))
-        if ranks[-1] != len(regrouping):
-            failures.append(f"rank modulo {p} is {ranks[-1]}, not {len(regrouping)}: the base columns are dependent")
-        failures += _false_identities(regrouping, draw, W, index, base)
-    return min(ranks), primes, len(robot.parameters), tuple(failures)
-
-
-def _general(regrouping: Regrouping, seed: int) -> Exact:
-    """General loops: the identities at random points of the closed mechanism over F_p, the rank at its lengths in floats.
-
-    A smallest singular value far above rounding proves that the base columns are independent.
-    """
-    robot = regrouping.robot
-    K: dict[str, dict[str, Expression]] = {}
-    for b in regrouping.base:
-        for name, c in b.combination.items():
-            K.setdefault(name, {})[b.own] = c
-    W = FloatStates(robot, seed).regressor(robot.parameters, float_states(robot, robot.parameters))
-    base = W[:, [robot.parameters.index(own) for own in regrouping.own]]
-    rank = numeric_rank(base)[0]
-    failures = [] if rank == len(regrouping) else [f"rank is {rank}, not {len(regrouping)}: the base columns are dependent"]
+    exact_ranks, wrong = zip(*(_modulo(regrouping, seed + k, p, sampler) for k, p in enumerate(primes)), strict=True)
+    if close(robot).tied:
+        exact_rank = numeric_rank(witness.W[:, base])[0]
+    else:
+        exact_rank = min(exact_ranks)
+    failures = [] if exact_rank == len(regrouping) else [f"rank is {exact_rank}, not {len(regrouping)}: the base columns are dependent"]
     if regrouping.method == NUMERIC:
-        predicted = base @ np.array(
-            [[K.get(name, {}).get(own, ZERO).value(robot.constants) for name in robot.parameters] for own in regrouping.own]
-        )
-        off = np.abs(predicted - W).max(axis=0) > ROUNDED * np.abs(W).max()
-        return (
-            rank,
-            (),
-            len(robot.parameters),
-            (*failures, *(f"column of {robot.parameters[c]} is not what the formulas say" for c in np.flatnonzero(off))),
-        )
-    primes = primes_for(robot, 2)
-    for k, p in enumerate(primes):
-        wrong = identities(robot, K, seed + k, p=p)
-        failures += [f"column of {name} is not what the formulas say (modulo {p})" for name in wrong]
-    return rank, primes, len(robot.parameters), tuple(failures)
+        failures += [f"column of {name} is not what the formulas say (in floats)" for name in _false_in_floats(regrouping, witness.W, base)]
+        primes = ()
+    else:
+        failures += [
+            f"column of {name} is not what the formulas say (modulo {p})" for p, names in zip(primes, wrong, strict=True) for name in names
+        ]
+    chi = np.random.default_rng(6).standard_normal(len(robot.parameters))
+    tau = witness.W @ chi
+    error = float(np.abs(tau - witness.W[:, base] @ base_values(regrouping, chi)).max() / np.abs(tau).max())
+    return Certificate(
+        robot.name,
+        regrouping.method,
+        len(regrouping),
+        exact_rank,
+        primes,
+        len(robot.parameters),
+        tuple(failures),
+        numeric_rank=rank,
+        numeric_gap=gap,
+        torque_error=error,
+    )
 
 
-def _false_identities(regrouping: Regrouping, draw: Draw, W: Array, index: dict[str, int], base: Array) -> list[str]:
-    p = draw.p
+def _modulo(regrouping: Regrouping, seed: int, p: int, sampler: Sampler) -> tuple[int, list[str]]:
+    """Rank of the base columns over F_p (0 for general loops, whose points have a geometry each), and the columns that are not what the formulas say."""
+    robot = regrouping.robot
+    names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
+    if close(robot).tied:
+        try:
+            draw: Draw = closed_draw(robot, seed, 3, p=p)
+        except ArithmeticError:
+            return 0, list(names) if regrouping.method != NUMERIC else []
+        W = draw.regressor(names)
+    else:
+        draw = Draw(robot, seed, states_for(robot, names), p=p)
+        W = sampler(draw, names)
     predicted = np.zeros_like(W)
     for k, b in enumerate(regrouping.base):
         for name, coefficient in b.combination.items():
             c = draw.constant(coefficient)
-            residue = int(c.x[0]) if isinstance(c, Fp) else c % p
-            column = index[name]
-            predicted[:, column] = (predicted[:, column] + base[:, k] * residue) % p
-    wrong = np.flatnonzero((predicted != W).any(axis=0))
-    return [f"column of {regrouping.robot.parameters[c]} is not what the formulas say (modulo {p})" for c in wrong]
+            residue = c.x if isinstance(c, Fp) else c % p
+            column = names.index(name)
+            predicted[..., column] = (predicted[..., column] + W[..., own[k]] * residue) % p
+    wrong = np.flatnonzero((predicted != W).reshape(-1, len(names)).any(axis=0))
+    rank = 0 if close(robot).tied else len(rref(W[:, own], p)[0])
+    return rank, [names[c] for c in wrong]
+
+
+def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[str]:
+    """Columns of the independent regressor that the formulas miss by more than ROUNDED of the largest entry."""
+    robot = regrouping.robot
+    K = np.zeros((len(base), len(robot.parameters)))
+    for k, b in enumerate(regrouping.base):
+        for name, c in b.combination.items():
+            K[k, robot.parameters.index(name)] = c.value(robot.constants)
+    off = np.abs(W[:, base] @ K - W).max(axis=0) > ROUNDED * np.abs(W).max()
+    return [robot.parameters[c] for c in np.flatnonzero(off)]
 
 
 @lru_cache(maxsize=4)

@@ -140,10 +140,6 @@ class ClosedDraw(Draw):
                     M[r] = (M[r] - M[r, c] * M[c]) % p
         return M[:, m]
 
-    def value(self, e: Expression) -> Array:
-        """A coefficient at every sample."""
-        return self._array(self.constant(e))
-
     def regressor(self, names: Sequence[str]) -> Array:
         """Columns `names`, shape (joints, samples, len(names))."""
         D = columns(Motion(Geometry(self.robot, self, self.system.closure)), names)
@@ -344,19 +340,3 @@ def _nullspace(
     if not denominator:
         return None
     return {k: e * denominator.inverse() for k, e in sides.items() if e}
-
-
-def identities(robot: Robot, K: Mapping[str, Mapping[str, Expression]], seed: int, *, p: int | None = None) -> list[str]:
-    """Standard columns that are not what K says at random points of V. Raises ArithmeticError where V is not drawn."""
-    draw = closed_draw(robot, seed, 3, p=p)
-    names = robot.parameters
-    D = draw.regressor(names)
-    column = {name: c for c, name in enumerate(names)}
-    wrong = []
-    for name in names:
-        predicted = np.zeros(D.shape[:2], dtype=np.int64)
-        for k, e in K.get(name, {}).items():
-            predicted = (predicted + D[..., column[k]] * draw.value(e)) % draw.p
-        if (predicted != D[..., column[name]]).any():
-            wrong.append(name)
-    return wrong

@@ -19,7 +19,7 @@ from symgen.regroup.finite_field import rref
 from symgen.regroup.general import base_and_relations
 from symgen.regroup.numbers import numbered
 from symgen.regroup.rules import Combination, Step, Transfer
-from symgen.regroup.solve import coefficients, sample, states_for
+from symgen.regroup.solve import coefficients, numeric_coefficients, sample, states_for
 
 FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
 EXACT = "exact over F_p"
@@ -86,8 +86,11 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     base = tuple(names[c] for c in pivots)
     dependent = [c for c in range(len(names)) if c not in pivots]
     supports = {names[c]: tuple(base[k] for k in range(len(base)) if R[k, c]) for c in dependent}
-    relations = {name: dict(zip(supports[name], found, strict=True)) for name, found in coefficients(robot, supports).items()}
-    return replace(_assemble(robot, transfer, base, relations, draw), robot=given)
+    exact, missing = coefficients(robot, supports)
+    found = exact | {name: numeric_coefficients(given, name, supports[name]) for name in missing}
+    relations = {name: dict(zip(supports[name], found.get(name, []), strict=True)) for name in supports}
+    regrouping = _assemble(robot, transfer, base, relations, draw)
+    return replace(regrouping, robot=given, method=NUMERIC if missing else EXACT)
 
 
 def _regroup_general(robot: Robot, transfer: Transfer, names: tuple[str, ...]) -> Regrouping:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from itertools import combinations, combinations_with_replacement, product
 from math import isqrt
 from typing import Protocol
@@ -22,17 +23,17 @@ import numpy as np
 
 from symgen.derive.columns import columns
 from symgen.derive.exact import PI, Array, Draw, Fp, Variable, fixed_angles, primes_for, roots_of, units_of
+from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion
 from symgen.description.expression import Call, Expression, Number
 from symgen.description.robot import Robot
-from symgen.errors import SymgenError
 from symgen.regroup.finite_field import rref, small_rational, solve_each
 from symgen.regroup.numbers import numbers_of
 
 MAX_UNKNOWNS = 900
-MAX_PRIMES = 40  # of 31 bits each: numerators and denominators of some 180 digits
+MAX_PRIMES = 24  # of 31 bits each: numerators and denominators of some 110 digits
 MAX_WORK = 1e9  # multiplications of one recognition, some seconds
 FREEDOMS = (("numbers", "pi"), ("numbers",), ())  # what is an indeterminate beside constants and transcendental angles
 DEGREES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (3, 0), (3, 2), (3, 3), (4, 0), (4, 4), (6, 0), (6, 6))
@@ -65,22 +66,34 @@ def states_for(robot: Robot, names: Sequence[str]) -> int:
     return int(np.ceil(needed + 10 / len(robot.joints))) + 4
 
 
-def coefficients(robot: Robot, supports: Supports) -> dict[str, list[Expression]]:
-    """beta of D_dependent = sum_k beta_k D_support,k, exact. Raises SymgenError if no P/Q of moderate degree fits."""
+def coefficients(robot: Robot, supports: Supports) -> tuple[dict[str, list[Expression]], dict[str, str]]:
+    """beta of D_dependent = sum_k beta_k D_support,k, exact, and for those that no P/Q of moderate degree fits the reason."""
     supports = {name: support for name, support in supports.items() if support}
     result: dict[str, list[Expression]] = {}
     reasons: dict[str, str] = {}
     for free in FREEDOMS:
         left = {name: support for name, support in supports.items() if name not in result}
         if left:
-            recognition = Recognition(robot, left, lambda k, free=free, left=left: Residues(robot, left, free, k), reasons)
+            recognition = Recognition(robot, left, partial(Residues, robot, left, free), reasons)
             result |= recognition.coefficients()
-    for name in supports:
-        if name not in result:
-            raise SymgenError(
-                f"robot {robot.name}: {name} depends on {', '.join(supports[name])}, but the coefficients were not recognised: {reasons[name]}"
-            )
-    return {name: result.get(name, []) for name in supports}
+    return result, {name: reasons[name] for name in supports if name not in result}
+
+
+def numeric_coefficients(robot: Robot, name: str, support: Sequence[str]) -> list[Expression]:
+    """beta of D_name = sum_k beta_k D_support,k as numbers, for the constants of the robot file, by least squares at random states."""
+    rng = np.random.default_rng(43)
+    count = states_for(robot, (*support, name))
+    q, qd, qdd = (dict(zip(robot.moving, rng.uniform(-1, 1, (len(robot.moving), count)), strict=True)) for _ in range(3))
+    D = columns(Motion(Geometry(robot, FloatAlgebra(robot, q, qd, qdd), close(robot))), (*support, name))
+    W = np.stack(
+        [
+            np.concatenate([np.broadcast_to(np.asarray(D[k].get(j, 0), dtype=float), (count,)) for j in robot.joints])
+            for k in (*support, name)
+        ],
+        axis=-1,
+    )
+    size = np.linalg.norm(W[:, :-1], axis=0)
+    return [Expression.number(repr(float(x))) for x in np.linalg.lstsq(W[:, :-1] / size, W[:, -1], rcond=None)[0] / size]
 
 
 class Source(Protocol):
@@ -194,9 +207,14 @@ class Recognition:
         result: dict[str, list[Expression]] = {}
         for name, support in self.supports.items():
             if name in matters:
-                found = [self._recognise(name, k, matters[name][k]) for k in range(len(support))]
-                if all(e is not None for e in found):
-                    result[name] = [e for e in found if e is not None]
+                found: list[Expression] = []
+                for k in range(len(support)):
+                    e = self._recognise(name, k, matters[name][k])
+                    if e is None:
+                        break
+                    found.append(e)
+                else:
+                    result[name] = found
         return result
 
     def _what_matters(self) -> dict[str, list[list[Variable]]]:
@@ -226,8 +244,11 @@ class Recognition:
             if self.pools[0].beta[name] is None:
                 self.reasons[name] = "the relation does not hold for every geometry"
                 return None
-            entries = None if vector is None else self._rationals(vector, name, k, P, Q)
-            if entries is not None:
+            if vector is not None:
+                entries = self._rationals(vector, name, k, P, Q)
+                if entries is None:
+                    self.reasons[name] = "a coefficient is not rational in what may vary"
+                    return None
                 return _fraction(entries, P, Q)
         self.reasons[name] = f"no fraction of degree up to {DEGREES[-1]} in {_texts(matters) or 'rational numbers'}"
         return None
