@@ -119,6 +119,11 @@ class Expression:
         return self.terms.get(()) if len(self.terms) == 1 else None
 
     @property
+    def ordered(self) -> list[tuple[Monomial, Fraction]]:
+        """The terms in the order of the text: highest degree first."""
+        return sorted(self.terms.items(), key=lambda mc: _order(mc[0]))
+
+    @property
     def atoms(self) -> set[str | Call]:
         return {a for m in self.terms for a, _ in m}
 
@@ -159,7 +164,7 @@ class Expression:
     def evaluate(self, value: Callable[[str], Any], function: Callable[[str, Expression], Any], number: Callable[[Fraction], Any]) -> Any:
         """Fold over any scalars: `value` of a symbol (and of pi), `function(name, argument)` of a call, `number` of a rational."""
         total: Any = number(Fraction(0))
-        for m, c in sorted(self.terms.items(), key=lambda mc: _order(mc[0])):
+        for m, c in self.ordered:
             term: Any = number(c)
             for a, n in m:
                 base = function(a.function, a.argument) if isinstance(a, Call) else value(a)
@@ -187,7 +192,7 @@ class Expression:
         if not self.terms:
             return "0"
         text = ""
-        for m, c in sorted(self.terms.items(), key=lambda mc: _order(mc[0])):
+        for m, c in self.ordered:
             body = _factors(m, c)
             sign = "-" if c < 0 else "+"
             text += (f" {sign} " if text else ("-" if c < 0 else "")) + body
