@@ -27,7 +27,7 @@ from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.model.compiled import compiled_model
 from runtime.model.generated import GeneratedModel
 from symgen.description import load_robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 
 Array = np.ndarray
 

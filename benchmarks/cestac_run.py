@@ -53,7 +53,7 @@ from runtime.resolution.rounding import bits, stream
 from runtime.resolution.run import NumpyWorkspace
 from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 
 Array = np.ndarray
 ROBOT, KEY = "tx40", (0, 0)

@@ -40,7 +40,7 @@ from runtime.records.reading import read_records
 from runtime.resolution.cestac import Cestac, cestac
 from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 
 ROBOT, DELTA = "tx40", 2 * np.pi / 5000
 

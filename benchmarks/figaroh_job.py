@@ -46,7 +46,7 @@ from runtime.records.datasets import dataset_study, fetch
 from runtime.records.reading import read_records
 from runtime.settings.study import Decimate, Lowpass, Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 
 END, FACTOR, CUTOFF = 7.5, 40, 50.0  # s, n_d, Hz
 FILES = ("pos_read_data.csv", "curr_data.csv")

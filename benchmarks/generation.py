@@ -16,7 +16,7 @@ import sys
 import time
 
 from symgen.description import load_robot
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 
 def import_sympy() -> float:

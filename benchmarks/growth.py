@@ -38,7 +38,7 @@ from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
 from runtime.settings.study import CestacSettings, Decimate, Study
 from symgen.description import load_robot, parse_robot
-from symgen.emit import generate_files, generate_module
+from symgen.emit.generate import generate_files, generate_module
 
 SAMPLES = (1_000, 10_000, 100_000, 1_000_000)
 JOINTS = (2, 4, 6, 9, 12, 16, 20, 30)

@@ -34,7 +34,7 @@ import numpy as np
 from runtime import load_model
 from runtime.result_files import FINISHED, LOCK, UNFINISHED
 from symgen import load_robot
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 MAIN = "from symgen.cli.main import main; main()"
 OFTEN = "from runtime.resolution.checkpoint import Checkpoint; Checkpoint.__init__.__kwdefaults__['every'] = 0.02; " + MAIN

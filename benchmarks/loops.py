@@ -32,7 +32,7 @@ from rounds import interleave, processor, ratio
 from symgen.derive.loops import close
 from symgen.description import load_robot
 from symgen.emit.printers import Text
-from symgen.emit.render import render
+from symgen.emit.numpy_target import render
 from symgen.emit.spec import ModuleSpec, inverse_dynamics, is_inertial, is_inertial_or_actuator, module_spec, regressor_program
 from symgen.regroup.regrouping import regroup
 
@@ -81,7 +81,7 @@ def speed(modules: dict[str, ModuleType], specs: dict[str, ModuleSpec], rounds: 
     weight: dict[str, int] = {}
     for name, module in modules.items():
         contenders[name] = _regressor(module, record(module))
-        f = specs[name].regressor
+        f = specs[name].functions["regressor"]
         weight[name] = f.mul + f.add + f.sin + f.cos
         if hasattr(module, "_START"):
             contenders[f"{name}, closure"] = _closed(module, record(module))

@@ -44,7 +44,7 @@ from runtime.model.compiled import compiled_model
 from runtime.model.generated import GeneratedModel
 from symgen.description import load_robot
 from symgen.description.robot import PRISMATIC, Robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 
 SOURCE = Path(__file__).with_suffix(".cpp")
 DEFINITIONS = (  # those of the package's CMake target

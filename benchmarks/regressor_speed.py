@@ -45,7 +45,7 @@ from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_state
 from symgen.description import load_robot
 from symgen.description.robot import Robot
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 SAMPLES = 7103  # not a multiple of 8
 MEMORY = 64e6  # bytes beside W

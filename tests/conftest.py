@@ -63,7 +63,6 @@ def tx40_data():
 def pytest_configure(config):
     if not hasattr(config, "workerinput"):
         os.environ[DERIVED] = tempfile.mkdtemp(prefix="symgen-tests-")
-    import symgen.regroup.regrouping
 
     module = sys.modules["symgen.regroup.regrouping"]
     module.base_and_relations = once_a_run(module.base_and_relations, Path(os.environ[DERIVED]))

@@ -32,7 +32,7 @@ ONLY_IN = {  # library: files and folders that may import it
     "rich": ("symgen/cli/",),
     "pydantic": ("symgen/description/", "runtime/errors.py", "runtime/settings/", "runtime/json_documents.py"),
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/settings/yaml.py"),
-    "sympy": ("symgen/regroup/symbolic.py",),
+    "sympy": ("symgen/regroup/formula.py",),
     "mpmath": ("symgen/derive/precise.py", "symgen/regroup/general.py"),
     "casadi": ("symgen/derive/lagrange.py", "runtime/motion/", "runtime/excitation/search.py", "generated/"),
     "pooch": ("runtime/records/datasets.py",),
@@ -50,7 +50,6 @@ ONLY_IN = {  # library: files and folders that may import it
 }
 LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be mended, then empty
     "runtime.observation.by_blocks": {"runtime.estimators", "runtime.estimators.block_covariance"},
-    "symgen.regroup.regrouping": {"symgen.report.notebook"},
     "symgen.demo.demonstration": {"symgen.cli.session"},
     "symgen.demo.haptic": {f"symgen.cli.{name}" for name in ("session", "writing", "identify", "pages", "resolution_files")},
     "symgen.demo.simulated_record": {"symgen.cli.session"},

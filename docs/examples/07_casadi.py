@@ -8,7 +8,7 @@ import numpy as np
 
 from runtime.model.casadi import load_symbolic
 from symgen import load_robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 
 folder = Path(tempfile.mkdtemp())
 for name, text in generate_files(load_robot("planar_2r"), targets=("casadi",)).items():

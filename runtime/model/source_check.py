@@ -2,7 +2,7 @@
 
 At the top stand docstrings, one import (`import numpy as np`, `import casadi as ca` or `from array_api_compat import array_namespace`), assignments
 to names, functions and, for NumPy, the class of the stores. Statements, expressions, builtins, functions of the package and attributes are those
-that emitters write, no decorators, no annotations, no name or attribute with two underscores but the two below. An attribute is set only where a
+that emitters write, no decorators, no hints but HINTS, no name or attribute with two underscores but the two below. An attribute is set only where a
 store is marked ready, so nothing of the process (numpy.sin, say) can be replaced; packages themselves are never values. CasADi functions can
 compile and run C, and write files: of them only the construction from expressions is allowed, with `default_in` as the one option.
 
@@ -52,6 +52,9 @@ FINALIZE = "__array_finalize__"  # the one special method, of Store(np.ndarray)
 UNTOUCHED = (
     frozenset(dir(builtins)) | PACKAGES.keys() | {ARRAYS}
 )  # neither assigned nor taken as an argument: names are looked at without scopes
+HINTS = frozenset(
+    {"np.ndarray", "np.ndarray | None", "np.ndarray | tuple", "Store", "Store | None", "ca.Function", "int", "int | None", "float", "dict"}
+) | {repr(hint) for hint in ("Array", "Array | None", "Array | tuple", "dict", "int | None")}
 LITERALS = (str, int, float, bool, type(None), type(...))
 
 
@@ -123,7 +126,7 @@ class _Shape:
     def of_functiondef(self, node: ast.FunctionDef) -> None:
         method = isinstance(self.parent[id(node)], ast.ClassDef)
         strange = node.name != FINALIZE if method else node.name.startswith("__")
-        if node.decorator_list or node.returns or strange:
+        if node.decorator_list or strange or (node.returns and ast.unparse(node.returns) not in HINTS):
             self.refuse(node, "a function that emitted models do not have")
 
     def of_classdef(self, node: ast.ClassDef) -> None:
@@ -134,7 +137,7 @@ class _Shape:
             self.refuse(node, "a class that emitted models do not have")
 
     def of_arg(self, node: ast.arg) -> None:
-        if node.annotation or node.arg.startswith("__"):
+        if node.arg.startswith("__") or (node.annotation and ast.unparse(node.annotation) not in HINTS):
             self.refuse(node, "an argument that emitted models do not have")
 
     def of_binop(self, node: ast.BinOp) -> None:
@@ -175,7 +178,7 @@ class _Shape:
             package, numerical = PACKAGES[node.value.id]
             if node.attr not in numerical or not isinstance(node.ctx, ast.Load):
                 self.refuse(node, f"not in the numerical part of {package} that emitted models use")
-            if ast.unparse(node) in ("ca.Function", "ca.jacobian", "np.ndarray", "np.linalg"):
+            if ast.unparse(node) in ("ca.Function", "ca.jacobian", "np.ndarray", "np.linalg") and not self.is_hint(node):
                 self.package_attribute(node, above)
         elif ast.unparse(node.value) == "np.linalg":
             if node.attr not in LINALG:
@@ -185,6 +188,13 @@ class _Shape:
                 self.refuse(node, "expected type(x).__name__")
         elif node.attr not in ATTRIBUTES.get(self.package or "", ()):
             self.refuse(node, "an attribute emitted models do not use")
+
+    def is_hint(self, node: ast.AST) -> bool:
+        """Whether the node is a hint of an argument or a result, or one of its alternatives; hints are checked as a whole."""
+        above = self.parent[id(node)]
+        if isinstance(above, ast.BinOp):
+            return isinstance(above.op, ast.BitOr) and self.is_hint(above)
+        return (isinstance(above, ast.arg) and above.annotation is node) or (isinstance(above, ast.FunctionDef) and above.returns is node)
 
     def package_attribute(self, node: ast.Attribute, above: ast.AST) -> None:
         """numpy.linalg only as numpy.linalg.name, numpy.ndarray never called, constructors of CasADi only called."""

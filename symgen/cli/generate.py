@@ -12,8 +12,7 @@ import typer
 from runtime.result_files import write_all
 from symgen.cli.doubts import tell_doubts
 from symgen.cli.session import NEGATIVE, fail, reported_errors
-
-TARGETS = {"numpy": "{}.py", "casadi": "{}_casadi.py", "c": "{}.c", "xp": "{}_xp.py"}
+from symgen.emit.targets import TARGETS
 
 
 def generate(
@@ -52,7 +51,7 @@ def emitted(robots: list[str], targets: Sequence[str] = ("numpy",)) -> dict[str,
         files = certified_files(robot, targets=targets, command=source if source in packaged_robots() else robot.file)
         if modules.keys() & files.keys():
             fail(f"two robots are called {robot.name}; their modules would overwrite each other")
-        for left_out in (t for t in targets if TARGETS[t].format(robot.name) not in files):
+        for left_out in (t for t in targets if TARGETS[t].file.format(robot.name) not in files):
             typer.echo(f"{robot.name}: no {left_out} target, its loops are closed by iteration; the NumPy module serves", err=True)
         modules |= files
     return modules

@@ -89,7 +89,7 @@ def opened_model(robot: str) -> Iterator[GeneratedModel]:
         return
     from runtime.records.formats.table import is_measured
     from symgen.description import load_robot
-    from symgen.emit import generate_module
+    from symgen.emit.generate import generate_module
 
     if Path(robot).is_file() and is_measured(Path(robot)):
         fail(f"{robot}: a measured file, where a robot is expected; the robot comes first, then the record")
@@ -115,7 +115,7 @@ def in_target(robot: str, model: GeneratedModel, target: str) -> GeneratedModel:
     path = Path(str(getattr(model, "__file__", ""))).with_suffix(".c")
     if Path(robot).suffix != ".py":
         from symgen.description import load_robot
-        from symgen.emit import generate_files
+        from symgen.emit.generate import generate_files
 
         for text in generate_files(load_robot(robot), targets=("c",)).values():
             path.write_text(text, encoding="utf-8")
@@ -135,7 +135,7 @@ def symbolic_file(robot: str, model: GeneratedModel) -> Path:
     path = here.with_name(f"{here.stem}_casadi.py")
     if Path(robot).suffix != ".py" and not path.exists():
         from symgen.description import load_robot
-        from symgen.emit import generate_files
+        from symgen.emit.generate import generate_files
 
         files = generate_files(load_robot(robot), targets=("casadi",))
         if path.name not in files:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from runtime.result_files import write_all
 from symgen.cli.session import fail, reported_errors
-
-if TYPE_CHECKING:
-    from symgen.description import Robot
 
 
 def snippet(
@@ -32,41 +28,16 @@ def snippet(
     """
     with reported_errors():
         from symgen.description import load_robot
-        from symgen.description.urdf_write import write_urdf
-        from symgen.emit import generate_module
-        from symgen.emit.use import PROGRAMS, use_script
+        from symgen.description.values import with_estimate
+        from symgen.emit.snippet import snippet_files
 
-        if program not in PROGRAMS:
-            fail(f"--for {program}; expected one of {', '.join(PROGRAMS)}")
         described = load_robot(robot)
         if estimate is not None:
-            described = with_estimate(described, estimate)
-        text, _ = write_urdf(described)
-        files = {
-            f"use_{program}.py": use_script(described, program, described.values),
-            f"{described.name}.urdf": text,
-            f"{described.name}.py": generate_module(described),
-        }
+            from runtime.estimators.estimate import load_estimate
+
+            described = with_estimate(described, load_estimate(estimate).details.get("standard"), str(estimate))
+        files = snippet_files(described, program)
         if taken := [name for name in files if (output / name).exists() and not force]:
             fail(f"{output} holds {', '.join(taken)} already; choose another folder or add --force")
         write_all(output, files)
         typer.echo(f"{output / f'use_{program}.py'}: run it with python; it needs {' and '.join([*files][1:])} beside it")
-
-
-def with_estimate(robot: Robot, file: Path) -> Robot:
-    """The robot with the standard parameters of a feasible estimate as its values; exit code 2 where the file has none or is of another robot."""
-    from runtime.estimators.estimate import load_estimate
-    from runtime.json_values import number
-
-    standard = load_estimate(file).details.get("standard")
-    if not isinstance(standard, dict):
-        fail(
-            f"{file}: holds base parameters alone; a program needs standard ones: set estimate: {{method: feasible}} in the study and identify again"
-        )
-    try:
-        values = {name: number(x) for name, x in standard.items()}
-    except ValueError as e:
-        fail(f"{file}: details.standard: {e}; the file was changed")
-    if unknown := sorted(set(standard) - set(robot.parameters)):
-        fail(f"{file}: {', '.join(unknown[:12])} are no parameters of {robot.name}; is it the estimate of another robot?")
-    return replace(robot, values={**robot.values, **values})

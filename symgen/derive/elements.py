@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from symgen.derive.newton_euler import Motion
 from symgen.derive.scalar import Scalar, add, mul
-from symgen.description.robot import Element, Form, Row
+from symgen.description.robot import Element, Form, parameter
 
 
 def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
@@ -16,7 +16,7 @@ def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
     if j in e.form:
         return _form(motion, e.kind, e.form[j])
     row = e.along[j]
-    x = _along(motion, e, row)
+    x = _along(motion, e, j)
     return {i: mul(motion.algebra.constant(g), x) for i, g in row.items()}
 
 
@@ -30,15 +30,17 @@ def _coordinate(motion: Motion, kind: str, j: int) -> Scalar:
             return motion.q(j)
 
 
-def _along(motion: Motion, e: Element, row: Row) -> Scalar:
+def _along(motion: Motion, e: Element, j: int) -> Scalar:
+    """x of the element with key j; the velocity along several joints is named after the element, since other rows may have these joints."""
     if e.kind == "offset":
         return 1 if motion.gravity else 0
+    row = e.along[j]
     rate: Scalar = 0
     for i, g in row.items():
         rate = add(rate, mul(motion.algebra.constant(g), _coordinate(motion, e.kind, i)))
     if e.kind in ("viscous", "coulomb"):
         if len(row) > 1:
-            rate = motion.algebra.name(rate, motion.named("QP", *row))
+            rate = motion.algebra.name(rate, f"{motion.named('QP')}{parameter(e.family, j)}")
         if type(rate) is int:
             return 0  # at rest
         key = motion.geometry.closure.in_independent(row)

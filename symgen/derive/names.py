@@ -6,6 +6,9 @@ link 2, Z132 component 1 in frame 3 of the axis of joint 2. With more than nine 
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+
 FAMILIES = {
     "th": "joint angle with its constant, rad",
     "C": "cosine of a joint angle or of a sum of angles",
@@ -15,7 +18,7 @@ FAMILIES = {
     "CG": "cosine of the fixed angle gamma",
     "SG": "sine of the fixed angle gamma",
     "r": "position of a prismatic joint with its constant, m",
-    "QP": "joint velocity",
+    "QP": "joint velocity; with the name of an element, QPFSM6, the velocity that it acts along",
     "QDP": "joint acceleration",
     "G": "rate of a passive joint per unit rate of an actuated one",
     "W": "angular velocity of a link, in its frame",
@@ -53,3 +56,12 @@ class Names:
         if family not in FAMILIES:
             raise KeyError(f"{family!r} is not a family of symgen/derive/names.py")
         return family + self.separator.join(str(i) for i in indices)
+
+
+MEMBER = re.compile(rf"({'|'.join(sorted(FAMILIES, key=len, reverse=True))})(?:\d[\d_mxb]*|(?<=QP)[A-Za-z]+\d+)\Z")
+
+
+def families_of(names: Iterable[str]) -> tuple[str, ...]:
+    """The families that `names` belong to, in the order of FAMILIES; products and sums of names belong to none."""
+    occurring = {match[1] for name in names if (match := MEMBER.match(name))}
+    return tuple(family for family in FAMILIES if family in occurring)

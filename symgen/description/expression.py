@@ -139,6 +139,11 @@ class Expression:
         return self.terms.get(()) if len(self.terms) == 1 else None
 
     @property
+    def ordered(self) -> list[tuple[Monomial, Fraction]]:
+        """The terms in the order of the text: highest degree first."""
+        return sorted(self.terms.items(), key=lambda mc: _order(mc[0]))
+
+    @property
     def atoms(self) -> set[str | Number | Call]:
         return {a for m in self.terms for a, _ in m}
 
@@ -190,7 +195,7 @@ class Expression:
         `kept` is the value of a Number, by default that of its rational.
         """
         total: Any = number(Fraction(0))
-        for m, c in sorted(self.terms.items(), key=lambda mc: _order(mc[0])):
+        for m, c in self.ordered:
             term: Any = number(c)
             for a, n in m:
                 base = (
@@ -226,7 +231,7 @@ class Expression:
         if not self.terms:
             return "0"
         text = ""
-        for m, c in sorted(self.terms.items(), key=lambda mc: _order(mc[0])):
+        for m, c in self.ordered:
             body = _factors(m, c)
             sign = "-" if c < 0 else "+"
             text += (f" {sign} " if text else ("-" if c < 0 else "")) + body

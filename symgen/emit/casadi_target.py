@@ -1,4 +1,4 @@
-"""What a CasADi module says beside the NumPy module: the same sections as statements on SX scalars, gathered into matrices.
+"""The CasADi module: the same sections as statements on SX scalars, gathered into matrices.
 
 The blocks receive lists of scalars, so that `q1, q2 = q` reads as in the NumPy module; a sparse matrix takes the results, so that structural
 zeros stay structural in the functions and in their derivatives. Joints that only the closure equations tie have no CasADi module: they are
@@ -7,26 +7,25 @@ found by a Newton iteration along the record, in the assembly mode of its start,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from symgen.derive.graph import COS, SIGN, SIN, SQRT
 from symgen.description.robot import Robot
-from symgen.emit.printers import Section, Text
-from symgen.emit.spec import ModuleSpec
+from symgen.emit.header import tables
+from symgen.emit.printers import Text
+from symgen.emit.python_target import arguments, constants_of, context, listed
+from symgen.emit.render import laid_out
+from symgen.emit.spec import Function, ModuleSpec, module_spec
 from symgen.errors import SymgenError
+from symgen.regroup.formula import Python
+from symgen.regroup.regrouping import Regrouping
 
-BLOCKS = {  # columns read, room for the result, what is returned, summary
-    "regressor": ("q, qd, qdd", "D = ca.SX({b}, {n})", "D.T", "D, shape ({n}, {b}), Gamma = D X."),
-    "inverse_dynamics": ("q, qd, qdd, X", "GAM = ca.SX({n}, 1)", "GAM", "Joint torques Gamma."),
-    "inertia_matrix": ("q, X", "A = ca.SX({n}, {n})", "A", "A(q): column i is Gamma for a unit acceleration of joint i from rest."),
-    "bias": ("q, qd, X", "GAM = ca.SX({n}, 1)", "GAM", "Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset."),
-    "gravity": ("q, X", "GAM = ca.SX({n}, 1)", "GAM", "Gamma at rest without friction: gravity, offset and springs."),
-    "frame_poses": ("q", "T = {{}}", "_poses(T)", "Homogeneous transform of every frame j in frame 0."),
-}
+LANGUAGE = Python("ca")
 
 
 class CasadiText(Text):
-    """The lines of one model on SX scalars."""
+    """The lines of one model on SX scalars; a stack of matrices is a list of them."""
 
     calls: ClassVar[dict[str, str]] = {COS: "ca.cos", SIN: "ca.sin", SIGN: "ca.sign", SQRT: "ca.sqrt"}
     pi: ClassVar[str] = "ca.pi"
@@ -34,26 +33,61 @@ class CasadiText(Text):
     def _clipped(self, x: str, bound: str) -> str:
         return f"ca.{'fmax' if bound == 'maximum' else 'fmin'}({x}, 0.0)"
 
+    def place(self, result: str, indices: Sequence[int]) -> str:
+        *stack, row, column = indices if len(indices) > 1 else (*indices, 0)
+        return f"{result}{''.join(f'[{k}]' for k in stack)}[{row}, {column}]"
 
-def blocks(spec: ModuleSpec) -> list[dict[str, object]]:
-    """The models, each with its signature, the matrix it fills and what it returns."""
-    robot = spec.robot
-    sizes = {"n": len(robot.joints), "b": len(spec.regrouping)}
-    found: list[dict[str, object]] = []
-    for name, (columns, room, returned, summary) in BLOCKS.items():
-        preset = spec.constant_entries if name == "regressor" else ()
-        found.append(
-            {
-                "name": f"_{name}",
-                "arguments": ", ".join([columns, *robot.constants]),
-                "summary": summary.format(**sizes),
-                "room": room.format(**sizes),
-                "preset": [f"D[{k}, {j}] = {value}" for k, j, value in preset],
-                "sections": getattr(spec, name).sections or (Section("Nothing acts", ()),),
-                "returned": returned,
-            }
-        )
-    return found
+
+def render(regrouping: Regrouping, *, command: str | None = None) -> str:
+    """The CasADi module of a robot. Same robot file, same version: same bytes."""
+    robot, spec = regrouping.robot, module_spec(regrouping, CasadiText)
+    check_labels(robot)
+    values = context(spec, command, LANGUAGE, "ca.SX")
+    functions, path_constants = spec.functions, values["path_constants"]
+    takes = {name: arguments(f) for name, f in functions.items()} | {
+        "base_parameters": ["standard", *constants_of(robot, *(c.symbols for b in regrouping.base for c in b.combination.values()))],
+        "forward_dynamics": [
+            "q",
+            "qd",
+            "tau",
+            "X",
+            *constants_of(robot, functions["inertia_matrix"].constants, functions["bias"].constants),
+        ],
+        "passive_joints": ["q", "qd", "qdd", *values["passive_constants"]],  # type: ignore[misc]
+        "jacobian": ["q", *constants_of(robot, functions["frame_poses"].constants, path_constants)],  # type: ignore[arg-type]
+    }
+    return laid_out(
+        "casadi.py",
+        {
+            **values,
+            "takes": takes,
+            "calls": {name: ", ".join(names) for name, names in takes.items()},
+            "tables": tables(spec, numpy=False),
+            "example": "".join(f", {name}={value!r}" for name, value in list(robot.constants.items())[:1]),
+            "labels": {name: [m.result] for name, m in values["models"].items()} | {"frame_poses": pose_labels(robot)},  # type: ignore[attr-defined]
+            "blocks": [_block(spec, f) for f in functions.values()],
+            "of_frame": listed(takes["jacobian"]),
+            "passive_constants": listed(takes["passive_joints"][3:]),
+        },
+    )
+
+
+def _block(spec: ModuleSpec, f: Function) -> dict[str, object]:
+    *stack, rows, columns = shape = (
+        f.model.shape(spec.robot, len(spec.regrouping))[:3] if len(f.model.axes) > 1 else (len(spec.robot.joints), 1)
+    )
+    matrix = f"ca.SX({rows}, {columns})"
+    text = CasadiText((), (), ())
+    regressor = f.model.name == "regressor"
+    return {
+        "name": f"_{f.model.name}",
+        "arguments": ", ".join(arguments(f)),
+        "summary": f"{f.model.summary}. Shape {shape[::-1] if regressor else shape}.",
+        "room": f"{f.model.result} = " + (f"[{matrix} for _ in range({stack[0]})]" if stack else matrix),
+        "preset": [f"{text.place(f.model.result, place)} = {value}" for place, value in f.preset],
+        "sections": f.sections,
+        "returned": f.model.result + (".T" if regressor else ""),
+    }
 
 
 def pose_labels(robot: Robot) -> list[str]:

@@ -22,7 +22,7 @@ import numpy as np
 from symgen.derive.columns import element_names
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 from symgen.emit.importing import cached_path, imported, stored_path
 from symgen.errors import SymgenError
 from symgen.regroup.certificate import TOLERANCE, Array, Certificate, certify_formulas, independent

@@ -8,6 +8,7 @@ from typing import Any
 
 from symgen.derive.columns import element_names
 from symgen.derive.loops import close
+from symgen.derive.names import FAMILIES
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.spec import WIDTH, ModuleSpec, unit
@@ -45,11 +46,18 @@ def header(spec: ModuleSpec) -> list[str]:
             "in `gravity` and in `bias` at qd = 0, that force is missing.",
             "",
         )
-    lines += ["", "Cost per sample"]
-    for name in ("regressor", "inverse_dynamics", "inertia_matrix", "bias", "gravity", "frame_poses", "closure", "curvature"):
-        if getattr(spec, name) is not None:
-            lines.append(f"    {name:<17} {getattr(spec, name).cost}")
-    return lines
+    lines += [
+        "",
+        "Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums",
+    ]
+    lines += [f"    {family:<4} {FAMILIES[family]}" for family in families(spec)]
+    return [*lines, "", "Cost per sample", *(f"    {name:<17} {f.cost}" for name, f in spec.functions.items())]
+
+
+def families(spec: ModuleSpec) -> list[str]:
+    """Families of the names in any block, in the order of FAMILIES."""
+    occurring = {family for f in spec.functions.values() for family in f.families} | {"GAM", "DG"}
+    return [family for family in FAMILIES if family in occurring]
 
 
 def one_sided_friction_that_absorbs(spec: ModuleSpec) -> list[str]:
@@ -135,7 +143,7 @@ def tables(spec: ModuleSpec, *, numpy: bool = True) -> list[str]:
         *literal("BASE_PARAMETERS", regrouping.names),
         *literal("STANDARD_PARAMETERS", robot.parameters),
         *literal("UNITS", {b.name: unit(robot, b.own) for b in regrouping.base}),
-        *literal("FORMULAS", {b.name: b.formula for b in regrouping.base}),
+        *literal("FORMULAS", {b.name: str(b.formula) for b in regrouping.base}),
         *literal("NO_EFFECT", regrouping.no_effect),
         *_structure(spec, numpy),
         *_drives(robot),
@@ -181,6 +189,11 @@ def literal(name: str, value: Any) -> list[str]:
     else:
         entries, opening, closing = [repr(v) for v in value], "(", ")"
     return [f"{name} = {opening}", *packed(entries), closing]
+
+
+def plain(text: str) -> str:
+    """Text that cannot end a docstring."""
+    return " ".join(text.replace("\\", "/").replace('"""', "'''").split(" ")).replace("\r", " ").replace("\n", " ")
 
 
 def packed(entries: Sequence[str], indent: str = "    ") -> list[str]:

@@ -6,7 +6,6 @@ A node has a line if it has a name, or if it is used more than once; then it tak
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from symgen.derive.graph import ADD, CONST, COS, INV, MUL, SIGN, SIN, SQRT, SYM,
 from symgen.errors import SymgenError
 
 CALLS = {COS: "np.cos", SIN: "np.sin", SIGN: "np.sign", SQRT: "np.sqrt"}
-MAX_NAME = 32
+MAX_NAME = 60
 
 
 @dataclass(frozen=True)
@@ -51,6 +50,12 @@ class Text:
         self.named = {node.index for node in self.nodes if node.op not in (SYM, CONST) and self._has_line(node)}
         self._assign_names()
         self.sections = self._sections(headings)
+
+    @property
+    def given(self) -> set[str]:
+        """Names that the recursions gave."""
+        named = [n for n in self.nodes if n.index in self.named and (n.name or n.hint)]
+        return {self.called[n.index] for n in named} | self.inputs
 
     @property
     def inputs(self) -> set[str]:
@@ -98,30 +103,32 @@ class Text:
         self.called[node.index] = name
 
     def _made_of(self, node: Node) -> str:
-        name = self._words(node)
-        if len(name) > MAX_NAME or not name[0].isalpha():
-            name = "K" + re.sub(r"\W", "", name)[: MAX_NAME - 1]
-        while name in self.taken:
-            name += "b"
-        node.name_sign = 1
-        if node.op == MUL:  # the name says product of names, whatever signs those have
-            a, b = node.operands
-            node.name_sign = self._name_sign(a.node) * self._name_sign(b.node)
-        return name
+        """The value of the node in letters, of the sign in which its line starts without a minus: p is plus, m minus, products stand side by side."""
+        node.name_sign, word = self._word(Scalar(None, node, 1))  # type: ignore[arg-type]
+        if len(word) > MAX_NAME or not word[0].isalpha():
+            word = "K" + word[: MAX_NAME - 1]
+        while word in self.taken:
+            word += "b"
+        return word
 
-    def _words(self, node: Node) -> str:
+    def _word(self, s: Scalar) -> tuple[int, str]:
+        """(sign, letters) of a value."""
+        node = s.node
         if node.index in self.called:
-            return self.called[node.index].replace(".", "")
-        match node.op:
-            case "const":
-                return "x" + str(node.value).replace("/", "d")
-            case "mul":
-                words = sorted((self._words(x.node) for x in node.operands), key=lambda w: w.startswith("x"))
-                return "".join(words)
-            case "add":
-                a, b = node.operands
-                return self._words(a.node) + ("p" if b.sign > 0 else "m") + self._words(b.node)
-        return node.op + "".join(self._words(x.node) for x in node.operands)
+            return s.sign * self._name_sign(node), self.called[node.index].replace(".", "")
+        if node.op == CONST:
+            return s.sign, "x" + str(node.value).replace("/", "d")
+        if node.op == ADD:
+            (sign, word), *rest = sorted(map(self._word, self._addends(s)), key=lambda term: -term[0])
+            return sign, word + "".join(("p" if sign * other > 0 else "m") + letters for other, letters in rest)
+        words = [self._word(x) for x in node.operands]
+        if node.op != MUL:
+            return s.sign, node.op + "".join("m" * (sign < 0) + word for sign, word in words)
+        sums = [x.node.op == ADD and x.node.index not in self.called for x in node.operands]
+        letters = [f"_{word}" if total else word for (_, word), total in zip(words, sums, strict=True)]
+        return s.sign * words[0][0] * words[1][0], "".join(sorted(letters, key=lambda w: (w.startswith("_"), w.startswith("x")))).lstrip(
+            "_"
+        )
 
     def _sections(self, headings: Sequence[tuple[int, str]]) -> tuple[Section, ...]:
         marks = [(0, "Inputs"), *headings]
@@ -154,6 +161,10 @@ class Text:
 
     # --- expressions ---
 
+    def place(self, result: str, indices: Sequence[int]) -> str:
+        """An entry of a result, as the target of an assignment."""
+        return f"{result}[{', '.join(map(str, indices))}]"
+
     def expression(self, s: Scalar | int) -> str:
         """Text of an output."""
         if isinstance(s, int):
@@ -185,19 +196,17 @@ class Text:
         return ("-" if s.sign < 0 else "") + f"{self.calls[node.op]}({self._operand(node.operands[0])})"
 
     def _sum(self, s: Scalar) -> str:
-        terms = self._terms(s)
-        terms.sort(key=lambda t: t.startswith("-"))  # a positive term first saves a negation
-        text = terms[0]
-        for term in terms[1:]:
-            text += f" - {term[1:]}" if term.startswith("-") else f" + {term}"
-        return text
+        first, *rest = sorted(
+            map(self._operand, self._addends(s)), key=lambda t: t.startswith("-")
+        )  # a positive term first saves a negation
+        return first + "".join(f" - {term[1:]}" if term.startswith("-") else f" + {term}" for term in rest)
 
-    def _terms(self, s: Scalar) -> list[str]:
-        terms: list[str] = []
+    def _addends(self, s: Scalar) -> list[Scalar]:
+        """The terms of a sum, those of sums without a line of their own included."""
+        terms: list[Scalar] = []
         for x in s.node.operands:
             x = x if s.sign > 0 else -x
-            inline = x.node.op == ADD and x.node.index not in self.called
-            terms += self._terms(x) if inline else [self._operand(x)]
+            terms += self._addends(x) if x.node.op == ADD and x.node.index not in self.called else [x]
         return terms
 
     def _product(self, s: Scalar) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from symgen.description.robot import Element, Robot
-from symgen.emit.render import render_use
+from symgen.emit.render import laid_out
 from symgen.errors import SymgenError
 from symgen.version import VERSION
 
@@ -56,7 +56,7 @@ def use_script(robot: Robot, program: str, values: Mapping[str, float]) -> str:
         "along": along,
         "standard": {name: float(values[name]) for name in robot.parameters},
     }
-    return render_use(program, context)
+    return laid_out(f"use_{program}.py", context)
 
 
 def _row(robot: Robot, e: Element, j: int) -> list[float]:

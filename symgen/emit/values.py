@@ -13,9 +13,11 @@ import numpy as np
 from symgen.derive.exact import Array, Draw, Fp, power
 from symgen.derive.graph import CONST, COS, INV, POS, SIGN, SIN, SQRT, Graph, Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.names import families_of
 from symgen.description.expression import Expression
 
 SAMPLES = 3
+RECURSIVE = {"W", "WP", "DV", "DW", "U", "VSP", "VP"}  # families whose line is their definition in the recursion, or absent
 
 
 class Program:
@@ -47,15 +49,15 @@ class Program:
         return image if s.sign > 0 else -image
 
     def _rebuild(self, node: Node) -> Scalar | int:
-        image = self._operate(node, [self.map(x) for x in node.operands])
-        if not isinstance(image, Scalar):
-            return image
-        if image.node.index not in self.value:
+        image = made = self._operate(node, [self.map(x) for x in node.operands])
+        if isinstance(image, Scalar) and image.node.index not in self.value:
             image = self._numbered(image, self._evaluate(node, image.node) if image.node.op == node.op else self._of(image.node))
-        if node.name is not None and isinstance(image, Scalar):
-            self.graph.name(image if node.name_sign > 0 else -image, node.name)
-        elif node.hint is not None and isinstance(image, Scalar):
-            self.graph.hint(image if node.name_sign > 0 else -image, node.hint)
+        if isinstance(image, Scalar) and isinstance(made, Scalar):
+            merged = image.node is not made.node  # U = DV - WP is a product of WP = DV - product: its name would turn the recursion around
+            if node.name is not None and not (merged and RECURSIVE & {*families_of([node.name])}):
+                self.graph.name(image if node.name_sign > 0 else -image, node.name)
+            elif node.hint is not None:
+                self.graph.hint(image if node.name_sign > 0 else -image, node.hint)
         return image
 
     def _operate(self, node: Node, x: list[Scalar | int]) -> Scalar | int:
@@ -69,10 +71,8 @@ class Program:
                 return x[0] + x[1]
             case "mul":
                 return x[0] * x[1]
-        y = graph.lift(x[0])
-        return {COS: graph.cos, SIN: graph.sin, SIGN: graph.sign, POS: graph.positive_part, SQRT: graph.sqrt, INV: graph.inverse}[node.op](
-            y
-        )
+        call = {COS: graph.cos, SIN: graph.sin, SIGN: graph.sign, POS: graph.positive_part, SQRT: graph.sqrt, INV: graph.inverse}[node.op]
+        return call(graph.lift(x[0]))
 
     def _numbered(self, image: Scalar, value: Array) -> Scalar | int:
         """`image`, or the equal node that was there before; `value` is that of the node, without the sign of the edge."""

@@ -62,6 +62,8 @@ class Certificate:
     module_errors : mapping
         Largest difference of each function of the emitted module from the independent dynamics, of the largest entry; empty where no
         module was evaluated.
+    general : bool
+        Whether the robot has general loops, whose rank is that of the independent regressor; singular values far above rounding prove it.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Certificate:
     numeric_gap: float
     torque_error: float
     module_errors: Mapping[str, float] = field(default_factory=dict)
+    general: bool = False
 
     @property
     def numeric_valid(self) -> bool:
@@ -110,7 +113,7 @@ class Certificate:
 
     def __str__(self) -> str:
         """A line per check, marked `ok` or FALSE, then the verdict."""
-        where = f"modulo {' and '.join(map(str, self.primes))}" if self.primes else "in floats"
+        where = f"modulo {' and '.join(map(str, self.primes))}" if self.primes and not self.general else "in floats"
         columns = any(text.startswith("column") for text in self.failures)
         lines = [
             f"{self.name}: {self.count} base parameters of {self.identities}, {self.method}",
@@ -182,6 +185,7 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
         numeric_rank=rank,
         numeric_gap=gap,
         torque_error=error,
+        general=bool(close(robot).tied),
     )
 
 
@@ -191,10 +195,11 @@ def _modulo(regrouping: Regrouping, seed: int, p: int, sampler: Sampler) -> tupl
     names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
     if close(robot).tied:
         try:
-            draw: Draw = closed_draw(robot, seed, 3, p=p)
+            closed = closed_draw(robot, seed, 3, p=p)
         except ArithmeticError:
             return 0, list(names) if regrouping.method != NUMERIC else []
-        W = draw.regressor(names)
+        draw: Draw = closed
+        W = closed.regressor(names)
     else:
         draw = Draw(robot, seed, states_for(robot, names), p=p)
         W = sampler(draw, names)

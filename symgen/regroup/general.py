@@ -210,10 +210,10 @@ class FloatStates:
         J, size = J[good], int(good.sum())
         rates = -np.linalg.solve(J[..., n:], J[..., :n])  # (samples, tied, n)
         qd, qdd = ({j: self.rng.standard_normal(size) for j in joints} for _ in range(2))
-        qd |= {u: sum(rates[:, a, k] * qd[i] for k, i in enumerate(joints)) for a, u in enumerate(closure.tied)}
+        qd |= {u: sum((rates[:, a, k] * qd[i] for k, i in enumerate(joints)), start=np.zeros(size)) for a, u in enumerate(closure.tied)}
         B = np.stack([np.broadcast_to(x, (size,)) for x in self.system.curvature(FloatAlgebra(self.robot, q, qd))], axis=-1)
         bend = np.linalg.solve(J[..., n:], -B[..., None])[..., 0]
-        qdd |= {u: bend[:, a] + sum(rates[:, a, k] * qdd[i] for k, i in enumerate(joints)) for a, u in enumerate(closure.tied)}
+        qdd |= {u: sum((rates[:, a, k] * qdd[i] for k, i in enumerate(joints)), start=bend[:, a]) for a, u in enumerate(closure.tied)}
         rate = {(u, i): rates[:, a, k] for a, u in enumerate(closure.tied) for k, i in enumerate(joints)}
         D = columns(Motion(Geometry(self.robot, FloatAlgebra(self.robot, q, qd, qdd, rate), closure)), names)
         return np.stack(

@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from typing import TypeVar
 
 from symgen.description.expression import Call, Expression, Number, call
 from symgen.description.robot import PRISMATIC, Robot
 
+K = TypeVar("K")
 LARGEST_WHOLE = 12  # whole numbers up to here are counts (2, 4) rather than lengths
 
 
@@ -27,7 +29,7 @@ def numbered(robot: Robot) -> Robot:
     return replace(robot, frames=frames, gravity=(x, y, z), constraints=constraints, elements=elements)
 
 
-def _rows(table: Mapping[int, Mapping[object, Expression]]) -> dict[int, dict[object, Expression]]:
+def _rows(table: Mapping[int, Mapping[K, Expression]]) -> dict[int, dict[K, Expression]]:
     return {j: {i: kept(g) for i, g in row.items()} for j, row in table.items()}
 
 
@@ -37,8 +39,9 @@ def kept(e: Expression) -> Expression:
     for m, c in e.terms.items():
         term = Expression({(): Fraction(1 if c > 0 else -1)}) * _atom(abs(c))
         for a, n in m:
-            inside = isinstance(a, Call) and a.function in ("sqrt", "inv") and a.argument.constant is None
-            base = call(a.function, kept(a.argument)) if inside else Expression({((a, 1),): Fraction(1)})
+            base = Expression({((a, 1),): Fraction(1)})
+            if isinstance(a, Call) and a.function in ("sqrt", "inv") and a.argument.constant is None:
+                base = call(a.function, kept(a.argument))
             term = term * base**n
         total = total + term
     return total

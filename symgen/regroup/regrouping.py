@@ -16,29 +16,41 @@ from symgen.derive.loops import close
 from symgen.description.expression import ONE, ZERO, Call, Expression, with_known_cosines
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.regroup.finite_field import rref
+from symgen.regroup.formula import Formula
 from symgen.regroup.general import base_and_relations
+from symgen.regroup.latex import aligned
+from symgen.regroup.notebook import table
 from symgen.regroup.numbers import numbered
 from symgen.regroup.rules import Combination, Step, Transfer
 from symgen.regroup.solve import coefficients, numeric_coefficients, sample, states_for
 
 FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
 EXACT = "exact over F_p"
-RECOGNISED = "recognised from 60-digit sampling"
 NUMERIC = "numeric, for the constants of the robot file; coefficients not recognised"
 LAST_CHOICE = ("MZ", "M", "YY")
 
 
 @dataclass(frozen=True)
 class BaseParameter:
-    """X = own + sum_k coefficient_k chi_k: `combination` maps standard parameters to coefficients, own first."""
+    """X = own + sum_k coefficient_k chi_k.
+
+    Attributes
+    ----------
+    name : str
+        Name of the standard parameter it is called after, with R where it takes in others.
+    own : str
+        The standard parameter it is called after.
+    combination : mapping
+        Coefficient of each standard parameter, `own` first.
+    """
 
     name: str
     own: str
     combination: Mapping[str, Expression]
 
     @property
-    def formula(self) -> str:
-        return formula(self.combination)
+    def formula(self) -> Formula:
+        return Formula(self.combination)
 
 
 @dataclass(frozen=True)
@@ -62,15 +74,18 @@ class Regrouping:
     def __len__(self) -> int:
         return len(self.base)
 
-    def _repr_html_(self) -> str:
-        from symgen.report.notebook import regrouping_html  # text of a page: loaded where a notebook asks for it
+    @property
+    def counts(self) -> str:
+        """How many base parameters there are, and how they were derived."""
+        return f"{len(self)} base parameters of {len(self.robot.parameters)}, {self.method}"
 
-        return regrouping_html(self)
+    def _repr_html_(self) -> str:
+        formulas = {b.name: b.formula for b in self.base if b.name != b.own}
+        alone = [b.name for b in self.base if b.name == b.own]
+        return table(self.robot.title or self.robot.name, self.counts, formulas, {"As they are": alone, "No effect": self.no_effect})
 
     def _repr_latex_(self) -> str:
-        from symgen.report.notebook import regrouping_latex
-
-        return regrouping_latex(self)
+        return f"$${aligned((b.name, b.formula) for b in self.base)}$$"
 
 
 def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
@@ -93,10 +108,12 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     return replace(regrouping, robot=given, method=NUMERIC if missing else EXACT)
 
 
+regrouping = regroup  # its public name, symgen.regrouping: symgen.regroup is the package
+
+
 def _regroup_general(robot: Robot, transfer: Transfer, names: tuple[str, ...]) -> Regrouping:
     base, relations, exact = base_and_relations(robot, names)
-    regrouping = _assemble(robot, transfer, base, relations, Draw(robot, 1, 1))
-    return replace(regrouping, method=EXACT if exact else NUMERIC)
+    return replace(_assemble(robot, transfer, base, relations, Draw(robot, 1, 1)), method=EXACT if exact else NUMERIC)
 
 
 def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -164,31 +181,3 @@ def simplified(e: Expression) -> Expression:
                     if e.terms.get(key) == value:
                         return simplified(e - cosine - partner + shorter)
     return e
-
-
-def shared(combination: Mapping[str, Expression]) -> dict[Expression, list[str]]:
-    """{coefficient: parameters that share it}, those with the opposite one as "-name"; the order is that of the formula."""
-    groups: dict[Expression, list[str]] = {}
-    for name, c in combination.items():
-        key = c if not (-c in groups and c not in groups) else -c
-        groups.setdefault(key, []).append(name if key == c else "-" + name)
-    return groups
-
-
-def formula(combination: Mapping[str, Expression]) -> str:
-    """Text of sum_k c_k chi_k in the grammar of robot files; parameters with one coefficient share it, as in eq. (27)."""
-    text = ""
-    for c, names in shared(combination).items():
-        inner = names[0] + "".join(f" - {n[1:]}" if n.startswith("-") else f" + {n}" for n in names[1:])
-        term = _term(c, inner, len(names) > 1)
-        text = term if not text else text + (f" - {term[1:]}" if term.startswith("-") else f" + {term}")
-    return text
-
-
-def _term(c: Expression, inner: str, several: bool) -> str:
-    if c == ONE:
-        return inner
-    if c == -ONE:
-        return f"-({inner})" if several else f"-{inner}"
-    factor = str(c) if len(c.terms) == 1 else f"({c})"
-    return f"{factor}*({inner})" if several else f"{factor}*{inner}"

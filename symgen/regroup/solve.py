@@ -60,7 +60,7 @@ def states_for(robot: Robot, names: Sequence[str]) -> int:
 
     The columns that act on the joints of a set S alone need |columns| <= states |S| rows: counted for the set of every column, and for all joints.
     """
-    acts = sample(Draw(robot, 5, 2), tuple(names)).reshape(len(robot.joints), 2, len(names)).any(axis=1).T
+    acts = (sample(Draw(robot, 5, 2), tuple(names)) != 0).reshape(len(robot.joints), 2, len(names)).any(axis=1).T
     sets = np.unique(np.vstack([acts[acts.any(axis=1)], np.ones((1, len(robot.joints)), dtype=bool)]), axis=0)
     needed = max(np.count_nonzero((acts <= S).all(axis=1)) / np.count_nonzero(S) for S in sets)
     return int(np.ceil(needed + 10 / len(robot.joints))) + 4
@@ -124,7 +124,7 @@ class Residues:
         self.names = tuple(dict.fromkeys(name for d, support in supports.items() for name in (*support, d)))
         whole = (PI, Fraction(1, units_of(robot).D))
         units = [u for u in units_of(robot).all if u != whole or ("pi" in free and fixed_angles(robot))]
-        numbers = [*numbers_of(robot), *roots_of(robot)] if "numbers" in free else []
+        numbers: list[Variable] = [*numbers_of(robot), *roots_of(robot)] if "numbers" in free else []
         self.variables: tuple[Variable, ...] = (*robot.constants, "pi", *units, *numbers)
         self.p = primes_for(robot, k + 1)[k]
         self.rng = np.random.default_rng(len(supports) + 1000 * k)

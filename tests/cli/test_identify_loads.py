@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from runtime.model.generated import load_model
 from symgen.cli.main import app
 from symgen.description import load_robot
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 RATE, N = 200.0, 3000
 STUDY = """

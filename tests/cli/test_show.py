@@ -118,7 +118,7 @@ def test_recursive_form_expands_to_the_flat_one():
 
     for b in regrouping.base:
         if b.name != b.own:
-            assert expanded(b.name) == parse(b.formula, names), b.name
+            assert expanded(b.name) == parse(str(b.formula), names), b.name
 
 
 @pytest.mark.parametrize(("arguments", "words"), [

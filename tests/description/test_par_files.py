@@ -64,7 +64,7 @@ def error_of(text, constants=VALUES):
 
 
 def formulas(robot):
-    return {b.name: b.formula for b in regroup(robot).base}
+    return {b.name: str(b.formula) for b in regroup(robot).base}
 
 
 @pytest.mark.parametrize("name", [name for name in packaged_robots() if name != "haptic"])

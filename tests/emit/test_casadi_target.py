@@ -15,7 +15,7 @@ import pytest
 
 from symgen.cli.generate import emitted
 from symgen.description import load_robot, packaged_robots, parse_robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 from symgen.errors import SymgenError
 
 GENERAL_LOOPS = {"four_bar", "five_bar"}  # closed by Newton iteration: NumPy only

@@ -25,7 +25,7 @@ from symgen.cli.main import app
 from symgen.description import load_robot, parse_robot, read_par, write_par, write_yaml
 from symgen.description.urdf import read_urdf
 from symgen.description.urdf_write import write_urdf
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 from symgen.emit.use import PROGRAMS, use_script
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import regroup

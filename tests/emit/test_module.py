@@ -11,7 +11,7 @@ import pytest
 
 from symgen.derive.lagrange import Lagrange
 from symgen.description import Robot, load_robot, parse_robot
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 from symgen.errors import SymgenError
 
 

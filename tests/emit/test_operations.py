@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from symgen.description import load_robot, packaged_robots
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 from symgen.emit.printers import Text
 from symgen.emit.spec import inverse_dynamics, is_inertial, is_inertial_or_actuator, module_spec, regressor_program
 from symgen.regroup.regrouping import Regrouping, regroup
@@ -64,8 +64,7 @@ def test_panda_limits() -> None:
 @pytest.mark.parametrize("name", packaged_robots())
 def test_names_come_from_structure(name: str) -> None:
     """No temporaries, no running numbers: every local is a family with indices, a product of names, or a constant."""
-    spec = module_spec(regroup(load_robot(name)))
-    for function in (spec.regressor, spec.inverse_dynamics, spec.inertia_matrix, spec.bias, spec.gravity, spec.frame_poses):
+    for function in module_spec(regroup(load_robot(name))).functions.values():
         lines = [line for section in function.sections for line in section.lines]
         names = [line.split(" = ")[0] for line in lines if "[" not in line.split(" = ")[0] and " = " in line]
         assert not [n for n in names if re.fullmatch(r"(tmp|t|x|K)\d+", n)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ast
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -11,21 +11,15 @@ from oracles.pinocchio_model import element_columns
 from oracles.random_robots import random_robot
 from runtime.model.loading import check_source
 from symgen.description import load_robot, packaged_robots
-from symgen.emit.physical import physical_tables
+from symgen.emit.generate import generate_module
 
 
 def constants(robot) -> dict:
-    text = "\n".join(physical_tables(robot))
-    check_source(text, "tables.py")
-    found: dict = {}
-    for name in ("LINKS", "ELEMENTS"):
-        found[name] = literal(text, name)
-    return found
-
-
-def literal(text: str, name: str):
-    (node,) = (n for n in ast.parse(text).body if n.targets[0].id == name)
-    return ast.literal_eval(node.value)
+    text = generate_module(robot)
+    check_source(text, "module.py")
+    module = ModuleType(robot.name)
+    exec(compile(text, robot.name, "exec"), module.__dict__)  # noqa: S102 (our own output)
+    return {"LINKS": module.LINKS, "ELEMENTS": module.ELEMENTS}
 
 
 def column(entry, place, qd, qdd, q) -> np.ndarray:

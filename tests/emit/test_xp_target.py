@@ -14,7 +14,7 @@ import pytest
 
 from symgen.cli.generate import emitted
 from symgen.description import load_robot, packaged_robots
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 from symgen.errors import SymgenError
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"

@@ -31,7 +31,7 @@ def read_and_derive(path: Path) -> object:
     """Small robots are derived and emitted as well, and the module is checked as a file is."""
     from runtime.model.loading import check_source
     from symgen.description import load_robot
-    from symgen.emit import generate_module
+    from symgen.emit.generate import generate_module
 
     robot = load_robot(path)
     if len(robot.frames) <= 5 and not robot.loops:

@@ -206,7 +206,7 @@ MOTION = {
 @cache
 def model_files() -> tuple[bytes, ...]:
     from symgen.description import load_robot
-    from symgen.emit import generate_module
+    from symgen.emit.generate import generate_module
 
     return tuple(generate_module(load_robot(name)).encode() for name in ("planar_2r", "emps_asymmetric"))
 
@@ -231,7 +231,7 @@ def estimate_file() -> bytes:
     from runtime.records.record import Record
     from runtime.settings.study import study_from_mapping
     from symgen.description import load_robot
-    from symgen.emit import generate_module
+    from symgen.emit.generate import generate_module
 
     text = generate_module(load_robot("planar_2r"))
     model = ModelText("planar_2r.py", text, sha256(text.encode()).hexdigest()).load()

@@ -13,7 +13,7 @@ from runtime.model.compiled import CompiledModel, compiled_model
 from runtime.resolution.c import kernels as fused
 from runtime.resolution.c import self_test as fused_check
 from symgen.description.robot import Robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 
 needs_compiler = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
 

@@ -20,7 +20,7 @@ from runtime.errors import InputError
 from runtime.model.compiled import CompiledModel, FallbackWarning, cache_folder, compiled_model
 from runtime.model.generated import GeneratedModel
 from symgen.description import load_robot, parse_robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 
 NAME = "planar_2r"
 needs_compiler = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")

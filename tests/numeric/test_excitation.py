@@ -20,7 +20,7 @@ from runtime.settings.schema import structure
 from runtime.settings.study import Decimate, Lowpass, Signals, Study
 from runtime.settings.trajectories import Motion, Part, motion_from_mapping
 from symgen.description import load_robot
-from symgen.emit import generate_files
+from symgen.emit.generate import generate_files
 
 STUDY = Study(signals=Signals(lowpass=Lowpass(cutoff=20.0), decimate=Decimate(factor=10)))
 VALUES = {"XX1": 0.1, "ZZ1": 0.3, "MX1": 0.8, "MY1": 0.1, "M1": 3.0, "ZZ2": 0.12, "MX2": 0.4, "MY2": 0.05, "M2": 1.5}

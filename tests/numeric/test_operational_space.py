@@ -12,7 +12,7 @@ from runtime.model.generated import load_model
 from symgen.description import load_robot
 from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, Frame
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 L1, L2, G = 0.5, 0.4, 9.81
 Q = np.array([[0.3, 0.9], [-1.1, 1.7], [2.0, -0.6], [0.4, 2.4]])

@@ -14,7 +14,7 @@ from runtime.estimators import estimate
 from runtime.model.generated import load_model
 from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 ROBOT = """
 symgen: 1

@@ -6,8 +6,8 @@ import pytest
 
 from runtime.errors import InputError, SettingsError
 from runtime.records.datasets import DATASETS, dataset_study
-from runtime.settings.arithmetic import number
 from runtime.records.named import study_of
+from runtime.settings.arithmetic import number
 from runtime.settings.files import load_study, study_from_text
 from runtime.settings.study import Study, study_from_mapping, to_mapping
 

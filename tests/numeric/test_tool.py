@@ -19,7 +19,7 @@ from runtime.settings.study import PayloadSettings
 from symgen.description import load_robot, parse
 from symgen.description.expression import Expression
 from symgen.description.robot import Frame
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 PINOCCHIO = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")
 TOOL = {"gamma": "pi/4", "b": "0.1", "alpha": "pi/3", "d": "0.05", "theta": "0.2", "r": "0.065"}

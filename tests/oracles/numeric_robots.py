@@ -39,7 +39,9 @@ def numeric_robot(seed: int) -> Robot:
 
 def numbers_in(robot: Robot, rng: Generator, *, angles: bool) -> Robot:
     """`robot` with most of its constants as numbers."""
-    in_angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols} | {s for e in robot.constraints.values() for s in e.symbols}
+    in_angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols} | {
+        s for e in robot.constraints.values() for s in e.symbols
+    }
     symbolic = rng.random() < 0.3
     values: dict[str, Expression] = {}
     for name in robot.constants:
@@ -51,6 +53,7 @@ def numbers_in(robot: Robot, rng: Generator, *, angles: bool) -> Robot:
             values[name] = parse(str(rng.choice(["9.80665", "9.81", "6.93", "4.9"])))
         else:
             values[name] = _length(rng)
+
     def put(e: Expression) -> Expression:
         return e.substitute(values)
 
@@ -122,18 +125,35 @@ def _uneven(rng: Generator, seed: int) -> Robot:
         q = Expression.symbol(f"q{j}")
         alpha = parse(str(rng.choice(["0", "pi/2", "-pi/2"]))) if hinge and j > 1 else ZERO
         frames.append(
-            Frame(j, j - 1 if 1 < j <= chain else 0, REVOLUTE if hinge else PRISMATIC, 1, ZERO, ZERO, alpha, _length(rng) if j > 1 and hinge else ZERO, q if hinge else ZERO, ZERO if hinge else q)
+            Frame(
+                j,
+                j - 1 if 1 < j <= chain else 0,
+                REVOLUTE if hinge else PRISMATIC,
+                1,
+                ZERO,
+                ZERO,
+                alpha,
+                _length(rng) if j > 1 and hinge else ZERO,
+                q if hinge else ZERO,
+                ZERO if hinge else q,
+            )
         )
     massless = frozenset(j for j in range(chain + 1, chain + slides + 1) if rng.random() < 0.85)
     each = {f.j: {f.j: ONE} for f in frames}
     one = {1: {1: ONE}}
-    elements = (Element("FV", "viscous", each, {}), Element("FS", "coulomb", one, {}), Element("OFFSET", "offset", one, {}), Element("K", "stiffness", one, {}))
+    elements = (
+        Element("FV", "viscous", each, {}),
+        Element("FS", "coulomb", one, {}),
+        Element("OFFSET", "offset", one, {}),
+        Element("K", "stiffness", one, {}),
+    )
     gravity = (ZERO, parse("-9.80665"), ZERO) if rng.random() < 0.5 else (ZERO, ZERO, parse("-9.81"))
     return Robot(name=f"uneven_{seed}", frames=tuple(frames), gravity=gravity, elements=elements, massless=massless)
 
 
 def describe_numbers(sample: Iterable[Robot]) -> dict[str, float]:
     """Share of the robots that have each feature."""
+
     def features(robot: Robot) -> dict[str, bool]:
         lengths = [e for f in robot.frames for e in (f.b, f.d, f.r0)]
         angles = [e for f in robot.frames for e in (f.gamma, f.alpha, f.theta0)]

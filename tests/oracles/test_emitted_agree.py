@@ -18,7 +18,7 @@ from oracles.random_robots import random_parameters, random_robot, random_state
 from symgen.derive.lagrange import Lagrange
 from symgen.description import load_robot, packaged_robots
 from symgen.description.robot import Robot
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 SEEDS = (*range(50), 66, 67, 68, 84, 116, 148, 178, 180, 208)  # above 50: seeds that once showed a fault
 PACKAGED = [robot for robot in map(load_robot, packaged_robots()) if not robot.passive]

@@ -17,7 +17,7 @@ from symgen.description import Robot
 from symgen.description.robot import FIXED, PRISMATIC
 from symgen.description.urdf import read_urdf
 from symgen.description.urdf_write import write_urdf
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 TOLERANCE = 1e-10  # of the largest torque of the sample
 

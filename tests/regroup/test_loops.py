@@ -146,7 +146,7 @@ def test_sr400_count() -> None:
 
 def test_friction_of_the_haptic_branch() -> None:
     """The pivots at +-qd2 and joint 4 with the pivots at +-qd5 are why fC2 and fC5 carry an R in Table 6, and fC1 none."""
-    formulas = {b.name: b.formula for b in regrouped("haptic").base}
+    formulas = {b.name: str(b.formula) for b in regrouped("haptic").base}
     assert formulas["FS2R"] == "FS2 + FSP2"
     assert formulas["FS5R"] == "FS5 + FS4 + FSP5"
     assert formulas["FS1"] == "FS1"

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from runtime.model.generated import load_model
 from symgen.cli.main import app
 from symgen.description import load_robot
-from symgen.emit import generate_module
+from symgen.emit.generate import generate_module
 
 DRAWN = "[...document.querySelectorAll('.plot .line')].map((n) => n.getAttribute('d')).join('|')"
 SPAN = "[...document.querySelectorAll('.plot')[0].querySelectorAll('text')].map((n) => n.textContent)"

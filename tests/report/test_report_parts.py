@@ -20,7 +20,7 @@ from runtime.reporting.parameters import cad_values, roles_of
 from runtime.reporting.residuals import decimation_cutoff
 from runtime.reporting.series import extremes, gaps, series
 from runtime.settings.study import Decimate, Signals
-from symgen.report.symbols import symbol as other_symbol
+from symgen.regroup.symbols import symbol as other_symbol
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 ROBOTS = ("tx40", "haptic", "panda", "emps", "sr400")

@@ -20,8 +20,9 @@ from symgen.description.expression import Call, Expression
 from symgen.description.grammar import parse
 from symgen.emit.spec import module_spec
 from symgen.errors import SymgenError
+from symgen.regroup import mathml
+from symgen.regroup.formula import Formula
 from symgen.regroup.regrouping import regroup
-from symgen.report import mathml
 from symgen.report.effects import effects
 from symgen.report.page import embedded, robot_page
 
@@ -75,7 +76,7 @@ def test_formulas_are_complete(pages, name):
 def test_formula_reads_as_the_text():
     """ZZ1R of the TX40, eq. (27), with the invisible operators and spaces taken away."""
     b = regroup(load_robot("tx40")).base[0]
-    text = "".join("".join(ElementTree.fromstring(m).itertext()) for m in mathml.formula(b.combination))
+    text = "".join("".join(ElementTree.fromstring(m).itertext()) for m in mathml.formula(b.formula))
     assert text.replace("\u2062", "") == "ZZ1+Ia1+YY2+YY3+D32(M3+M4+M5+M6)"
 
 
@@ -92,7 +93,7 @@ def test_expressions(text, expected):
 def test_names_cannot_bring_in_markup():
     """Names are identifiers already; were they not, they would still be escaped."""
     bad = Expression({((HOSTILE, 1), (Call("sin", Expression.symbol(HOSTILE)), 2)): parse("3").constant})
-    for made in (mathml.expression(bad), *mathml.formula({HOSTILE: parse("1"), HOSTILE + "2": bad})):
+    for made in (mathml.expression(bad), *mathml.formula(Formula({HOSTILE: parse("1"), HOSTILE + "2": bad}))):
         root = ElementTree.fromstring(made)
         assert {node.tag for node in root.iter()} <= {"math", "mrow", "msub", "msup", "mi", "mn", "mo", "mspace"}
 
