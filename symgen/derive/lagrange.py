@@ -313,6 +313,10 @@ def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, fl
         state = np.concatenate([state, np.array([q, qd, qdd])[:, closed]], axis=1)[:, :states]
         if len(D) == states:
             return Sample(model, *state, D)
+    if not robot.passive:
+        raise DescriptionError(
+            f"{robot.name}: torques are not finite for the constants {dict(robot.constants)}; check their values", path=("constants",)
+        )
     raise DescriptionError(
         f"{robot.name}: the loops close in {len(D)} of {DRAWS * states} random states near their start; give each loop a `start` that closes it",
         path=("loops",),
