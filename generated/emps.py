@@ -1,6 +1,6 @@
 """EMPS, one prismatic axis: base parameters, regressor, dynamics.
 
-GENERATED from emps.yaml, sha256 819142f28b57, by symgen 0.1.0. Do not edit; symgen generate emps
+GENERATED from emps.yaml, sha256 819142f28b57, by symgen 0.2.0. Do not edit; symgen generate emps
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha  d  theta   r

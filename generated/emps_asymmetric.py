@@ -1,6 +1,6 @@
 """EMPS, one prismatic axis, asymmetric friction: base parameters, regressor, dynamics.
 
-GENERATED from emps_asymmetric.yaml, sha256 bca2b7106ba8, by symgen 0.1.0. Do not edit; symgen generate emps_asymmetric
+GENERATED from emps_asymmetric.yaml, sha256 bca2b7106ba8, by symgen 0.2.0. Do not edit; symgen generate emps_asymmetric
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha  d  theta   r

@@ -1,6 +1,6 @@
 """Planar five-bar linkage, 2 actuated joints, general closed loop: base parameters, regressor, dynamics.
 
-GENERATED from five_bar.yaml, sha256 2b4cc8e44743, by symgen 0.1.0. Do not edit; symgen generate five_bar
+GENERATED from five_bar.yaml, sha256 2b4cc8e44743, by symgen 0.2.0. Do not edit; symgen generate five_bar
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  mu  sigma  alpha   d  theta  r

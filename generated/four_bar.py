@@ -1,6 +1,6 @@
 """Planar four-bar linkage, 1 actuated joint, general closed loop: base parameters, regressor, dynamics.
 
-GENERATED from four_bar.yaml, sha256 431dceb45593, by symgen 0.1.0. Do not edit; symgen generate four_bar
+GENERATED from four_bar.yaml, sha256 431dceb45593, by symgen 0.2.0. Do not edit; symgen generate four_bar
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  mu  sigma  alpha   d  theta  r

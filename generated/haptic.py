@@ -1,6 +1,6 @@
 """Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.1.0. Do not edit; symgen generate haptic
+GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.2.0. Do not edit; symgen generate haptic
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  mu  sigma  alpha    d  theta  r

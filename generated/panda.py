@@ -1,6 +1,6 @@
 """Franka Emika Panda, 7 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.1.0. Do not edit; symgen generate panda
+GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.2.0. Do not edit; symgen generate panda
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha    d  theta    r

@@ -1,6 +1,6 @@
 """Planar arm, 2 revolute joints, vertical plane: base parameters, regressor, dynamics.
 
-GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.1.0. Do not edit; symgen generate planar_2r
+GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.2.0. Do not edit; symgen generate planar_2r
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta  r

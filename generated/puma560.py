@@ -1,6 +1,6 @@
 """Unimation PUMA 560, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from puma560.yaml, sha256 01eccfddc5c5, by symgen 0.1.0. Do not edit; symgen generate puma560
+GENERATED from puma560.yaml, sha256 01eccfddc5c5, by symgen 0.2.0. Do not edit; symgen generate puma560
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta    r

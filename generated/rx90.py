@@ -1,6 +1,6 @@
 """Stäubli RX-90, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from rx90.yaml, sha256 7e24e40e8e70, by symgen 0.1.0. Do not edit; symgen generate rx90
+GENERATED from rx90.yaml, sha256 7e24e40e8e70, by symgen 0.2.0. Do not edit; symgen generate rx90
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta    r

@@ -1,6 +1,6 @@
 """SCARA with joints RRRP: base parameters, regressor, dynamics.
 
-GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.1.0. Do not edit; symgen generate scara
+GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.2.0. Do not edit; symgen generate scara
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta   r

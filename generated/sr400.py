@@ -1,6 +1,6 @@
 """SR400, 6 actuated joints, one parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.1.0. Do not edit; symgen generate sr400
+GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.2.0. Do not edit; symgen generate sr400
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
      j  ant  mu  sigma  gamma  alpha    d  theta    r

@@ -1,6 +1,6 @@
 """Stanford arm, 5 revolute joints and prismatic joint 3: base parameters, regressor, dynamics.
 
-GENERATED from stanford.yaml, sha256 123dd30dfd2b, by symgen 0.1.0. Do not edit; symgen generate stanford
+GENERATED from stanford.yaml, sha256 123dd30dfd2b, by symgen 0.2.0. Do not edit; symgen generate stanford
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha  d  theta    r

@@ -1,6 +1,6 @@
 """Tree of two branches, 7 joints, one of them prismatic, and a fixed tool: base parameters, regressor, dynamics.
 
-GENERATED from two_branch.yaml, sha256 22ecb3e74d7c, by symgen 0.1.0. Do not edit; symgen generate two_branch
+GENERATED from two_branch.yaml, sha256 22ecb3e74d7c, by symgen 0.2.0. Do not edit; symgen generate two_branch
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  gamma   b  alpha   d       theta         r

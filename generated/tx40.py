@@ -1,6 +1,6 @@
 """Stäubli TX40, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from tx40.yaml, sha256 fb8651f3f1d0, by symgen 0.1.0. Do not edit; symgen generate tx40
+GENERATED from tx40.yaml, sha256 fb8651f3f1d0, by symgen 0.2.0. Do not edit; symgen generate tx40
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta    r

@@ -1,6 +1,6 @@
 """Stäubli TX40, 6 revolute joints, Table 1 as printed: base parameters, regressor, dynamics.
 
-GENERATED from tx40_table1.yaml, sha256 06118b19e6c7, by symgen 0.1.0. Do not edit; symgen generate tx40_table1
+GENERATED from tx40_table1.yaml, sha256 06118b19e6c7, by symgen 0.2.0. Do not edit; symgen generate tx40_table1
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta    r

@@ -121,8 +121,8 @@ def room(package: str) -> str:
         own = module.__name__ == package
         if not own and not values:
             continue
-        if not own:
-            heading = module.__name__.rpartition(".")[2].replace("_", " ").capitalize()
+        if values or not own:
+            heading = module.__name__.rpartition(".")[2].replace("_", " ").capitalize() if not own else "Of the room itself"
             slugs(heading)
             parts += [f"## {heading}", f"`from {module.__name__} import {', '.join(v.__name__ for v in values)}`", markdown(module.__doc__)]
         for value in values:
