@@ -1,6 +1,6 @@
 """EMPS, one prismatic axis, asymmetric friction: base parameters, regressor, dynamics.
 
-GENERATED from emps_asymmetric.yaml, sha256 bca2b7106ba8, by symgen 0.1.0. Do not edit; symgen generate emps_asymmetric
+GENERATED from emps_asymmetric.yaml, sha256 bca2b7106ba8, by symgen 0.2.0. Do not edit; symgen generate emps_asymmetric
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha  d  theta   r
@@ -19,6 +19,13 @@ Base parameters, 5 of 15; Gautier and Khalil (1990), exact over F_p
     as they are: FVP1 FSP1 FVN1 FSN1
 No effect: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    F    force that moves a link
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+
 Cost per sample
     regressor         0 multiplications, 0 additions, 0 sin, 0 cos
     inverse_dynamics  5 multiplications, 4 additions, 0 sin, 0 cos
@@ -26,6 +33,9 @@ Cost per sample
     bias              4 multiplications, 3 additions, 0 sin, 0 cos
     gravity           0 multiplications, 0 additions, 0 sin, 0 cos
     frame_poses       0 multiplications, 0 additions, 0 sin, 0 cos
+
+Arguments   q, qd, qdd, tau of shape (N, 1), or (1,) for one state: results then have no axis of samples; rad or m and seconds
+            X of shape (5,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
 import numpy as np
@@ -58,12 +68,6 @@ VALUES = {
     'M1': 95.154, 'Ia1': 0.0, 'FVP1': 166.7061, 'FSP1': 20.144, 'FVN1': 240.4236, 'FSN1': 20.6277,
 }
 LINKS = (1,)
-ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
-    'Ia1': ('inertia', 'both', {1: 1.0}), 'FVP1': ('viscous', 'positive', {1: 1.0}),
-    'FSP1': ('coulomb', 'positive', {1: 1.0}), 'FVN1': ('viscous', 'negative', {1: 1.0}),
-    'FSN1': ('coulomb', 'negative', {1: 1.0}),
-}
-_PATHS = {1: ((1, 1, ((0, 1.0),)),)}
 
 
 class Store(np.ndarray):
@@ -75,30 +79,28 @@ class Store(np.ndarray):
         self.ready = False
 
 
-def store(N):
+def store(N: int) -> Store:
     """Room for N samples, shape (5, 1, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
     S = np.zeros((5, 1, N)).view(Store)
     S.ready = True
     return S
 
 
+def _states(*arrays):
+    """The states as rows of samples, shape (N, 1) each; ValueError unless all have shape (N, 1), or all (1,)."""
+    states = [np.asarray(x, dtype=float) for x in arrays]
+    shapes = [x.shape for x in states]
+    if shapes[0][-1:] != (1,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
+        raise ValueError(f"states of shape {shapes}; expected (N, 1) each, or (1,) each for one state")
+    return tuple([x.reshape(-1, 1) for x in states])
+
+
 def _fill(block, result, states, *arguments):
     """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
-    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
-    N = len(states[0])
+    N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
-    return result
-
-
-def _filled_store(q, qd, qdd, out, *constants):
-    N = np.size(q) // 1
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (5, 1, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(5, 1, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
 
 
 def _by_sample(result, q):
@@ -107,83 +109,111 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def base_parameters(standard, *, g=9.81):
+def elements(*, g: float = 9.81) -> dict:
+    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    return {
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FVP1': ('viscous', 'positive', {1: 1.0}),
+        'FSP1': ('coulomb', 'positive', {1: 1.0}), 'FVN1': ('viscous', 'negative', {1: 1.0}),
+        'FSN1': ('coulomb', 'negative', {1: 1.0}),
+    }
+
+
+ELEMENTS = elements()
+
+
+def base_parameters(standard: np.ndarray, *, g: float = 9.81) -> np.ndarray:
     """X, shape (5,), from the 15 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
-    (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FVP1, FSP1, FVN1, FSN1
-    ) = standard
+    _, _, _, _, _, _, _, _, _, M1, Ia1, FVP1, FSP1, FVN1, FSN1 = standard
     M1R = M1 + Ia1
     return np.array([
         M1R, FVP1, FSP1, FVN1, FSN1,
     ])
 
 
-def regressor(q, qd, qdd, *, out=None, g=9.81):
-    """D of Gamma = D X, shape (N, 1, 5); q, qd, qdd of shape (N, 1) or (1,), rad or m and seconds.
+def regressor(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, g: float = 9.81) -> np.ndarray:
+    """D of Gamma = D X. Shape (N, 1, 5).
 
     A view on one store of shape (5, 1, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
     faults, up to several times the arithmetic for large N.
     """
-    S = _filled_store(q, qd, qdd, out, g)
-    D = S.transpose(2, 1, 0)
+    D = _filled_store(q, qd, qdd, out).transpose(2, 1, 0)
     return D[0] if np.ndim(q) == 1 else D
 
 
-def observation_matrix(q, qd, qdd, *, out=None, g=9.81):
+def observation_matrix(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, g: float = 9.81) -> np.ndarray:
     """W of Y = W X + rho, shape (1*N, 5), Fortran order, rows joint-major: the same store, no copy."""
-    return _filled_store(q, qd, qdd, out, g).reshape(5, -1).T
+    return _filled_store(q, qd, qdd, out).reshape(5, -1).T
 
 
-def inverse_dynamics(q, qd, qdd, X, *, g=9.81):
-    """Joint torques Gamma, shape (N, 1), of base parameters X, shape (5,)."""
-    GAM = np.empty((1, np.size(q) // 1))
-    states = (q, qd, qdd)
-    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, g), q)
+def _filled_store(q, qd, qdd, out):
+    """`out`, or a new store, filled."""
+    states = _states(q, qd, qdd)
+    N = len(states[0])
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (5, 1, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(5, 1, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    D = out.view(np.ndarray)
+    _fill(_regressor_block, D, (states[1], states[2]))
+    return D
 
 
-def inertia_matrix(q, X, *, g=9.81):
-    """A(q), shape (N, 1, 1), actuators included."""
-    A = np.empty((1, 1, np.size(q) // 1))
-    states = (q,)
-    return _by_sample(_fill(_inertia_matrix_block, A, states, X, g), q)
+def inverse_dynamics(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+    """Joint torques Gamma. Shape (N, 1)."""
+    states = _states(q, qd, qdd)
+    GAM = np.zeros((1, len(states[0])))
+    _fill(_inverse_dynamics_block, GAM, (states[1], states[2]), X)
+    return _by_sample(GAM, q)
 
 
-def bias(q, qd, X, *, g=9.81):
-    """Gamma at qdd = 0, shape (N, 1): Coriolis, centrifugal, gravity, friction and offset."""
-    GAM = np.empty((1, np.size(q) // 1))
-    states = (q, qd)
-    return _by_sample(_fill(_bias_block, GAM, states, X, g), q)
+def inertia_matrix(q: np.ndarray, X: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 1, 1)."""
+    states = _states(q)
+    A = np.zeros((1, 1, len(states[0])))
+    _fill(_inertia_matrix_block, A, (), X)
+    return _by_sample(A, q)
 
 
-def gravity(q, X, *, g=9.81):
-    """Gamma at rest without friction, shape (N, 1): gravity, offset and springs (a base parameter may mix them)."""
-    GAM = np.empty((1, np.size(q) // 1))
-    states = (q,)
-    return _by_sample(_fill(_gravity_block, GAM, states, X, g), q)
+def bias(q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 1)."""
+    states = _states(q, qd)
+    GAM = np.zeros((1, len(states[0])))
+    _fill(_bias_block, GAM, (states[1],), X)
+    return _by_sample(GAM, q)
 
 
-def forward_dynamics(q, qd, tau, X, *, g=9.81):
-    """qdd = A(q)**-1 (tau - bias), shape (N, 1)."""
-    A, H = inertia_matrix(q, X, g=g), bias(q, qd, X, g=g)
+def gravity(q: np.ndarray, X: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 1)."""
+    states = _states(q)
+    GAM = np.zeros((1, len(states[0])))
+    _fill(_gravity_block, GAM, ())
+    return _by_sample(GAM, q)
+
+
+def frame_poses(q: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 1, 4, 4)."""
+    states = _states(q)
+    T = np.zeros((1, 4, 4, len(states[0])))
+    T[0, 0, 0] = T[0, 1, 1] = T[0, 2, 2] = T[0, 3, 3] = 1.0
+    _fill(_frame_poses_block, T, states)
+    return _by_sample(T, q)
+
+
+def forward_dynamics(q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 1)."""
+    A, H = inertia_matrix(q, X), bias(q, qd, X)
     return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, g=9.81):
-    """Homogeneous transform of every frame j in frame 0, shape (N, 1, 4, 4), at index j - 1."""
-    T = np.zeros((1, 4, 4, np.size(q) // 1))
-    T[:, 3, 3] = 1.0
-    states = (q,)
-    return _by_sample(_fill(_frame_poses_block, T, states, g), q)
-
-
-def jacobian(q, *, frame=1, g=9.81):
-    """J, shape (N, 6, 1): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, g=g).reshape(-1, 1, 4, 4)
+def jacobian(q: np.ndarray, *, frame: int | None = None, g: float = 9.81) -> np.ndarray:
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 1)."""
+    T = frame_poses(q).reshape(-1, 1, 4, 4)
     J = np.zeros((len(T), 6, 1))
-    P = T[:, (1 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[1 if frame is None else frame]:
+    last = 1 if frame is None else frame
+    P = T[:, last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -192,8 +222,15 @@ def jacobian(q, *, frame=1, g=9.81):
     return J[0] if np.ndim(q) == 1 else J
 
 
-def _regressor_block(q, qd, qdd, D, g):
-    """Fill D, shape (5, 1, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (1, N)."""
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 1, ((0, 1.0),)),),
+    }
+
+
+def _regressor_block(qd, qdd, D):
+    """Fill D, shape (5, 1, N), where it is not constant, from qd (1, N); qdd (1, N)."""
     # Inputs
     QP1 = qd[0]
     QDP1 = qdd[0]
@@ -207,8 +244,8 @@ def _regressor_block(q, qd, qdd, D, g):
     D[4, 0] = np.minimum(signQP1, 0.0)  # DG1FSN1
 
 
-def _inverse_dynamics_block(q, qd, qdd, GAM, X, g):
-    """Fill GAM, shape (1, N). q, qd, qdd: (1, N)."""
+def _inverse_dynamics_block(qd, qdd, GAM, X):
+    """Fill GAM, shape (1, N), where it is not constant, from qd (1, N); qdd (1, N)."""
     # Inputs
     QP1 = qd[0]
     QDP1 = qdd[0]
@@ -221,16 +258,16 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, g):
     GAM[0] = F31 + FVP1*np.maximum(QP1, 0.0) + FSP1*np.maximum(signQP1, 0.0) - FVN1*(-np.minimum(QP1, 0.0)) - FSN1*(-np.minimum(signQP1, 0.0))
 
 
-def _inertia_matrix_block(q, A, X, g):
-    """Fill A, shape (1, 1, N): column i is Gamma for a unit acceleration of joint i from rest. q: (1, N)."""
+def _inertia_matrix_block(A, X):
+    """Fill A, shape (1, 1, N), where it is not constant."""
     # Inputs
     M1R = X[0]
     # Inertia matrix
     A[0, 0] = M1R
 
 
-def _bias_block(q, qd, GAM, X, g):
-    """Fill GAM, shape (1, N), for qdd = 0. q, qd: (1, N)."""
+def _bias_block(qd, GAM, X):
+    """Fill GAM, shape (1, N), where it is not constant, from qd (1, N)."""
     # Inputs
     QP1 = qd[0]
     FVP1 = X[1]
@@ -243,26 +280,13 @@ def _bias_block(q, qd, GAM, X, g):
     GAM[0] = FVP1*np.maximum(QP1, 0.0) + FSP1*np.maximum(signQP1, 0.0) - FVN1*(-np.minimum(QP1, 0.0)) - FSN1*(-np.minimum(signQP1, 0.0))
 
 
-def _gravity_block(q, GAM, X, g):
-    """Fill GAM, shape (1, N), at rest. q: (1, N)."""
-    # Torques
-    GAM[0] = 0.0
+def _gravity_block(GAM):
+    """Fill GAM, shape (1, N), where it is not constant."""
 
 
-def _frame_poses_block(q, T, g):
-    """Fill T, shape (1, 4, 4, N). q: (1, N)."""
+def _frame_poses_block(q, T):
+    """Fill T, shape (1, 4, 4, N), where it is not constant, from q (1, N)."""
     # Inputs
     q1 = q[0]
     # Poses
-    T[0, 0, 0] = 1.0
-    T[0, 0, 1] = 0.0
-    T[0, 0, 2] = 0.0
-    T[0, 1, 0] = 0.0
-    T[0, 1, 1] = 1.0
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
     T[0, 2, 3] = q1

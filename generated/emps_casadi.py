@@ -1,6 +1,6 @@
 """EMPS, one prismatic axis: base parameters, regressor, dynamics as CasADi functions.
 
-GENERATED from emps.yaml, sha256 819142f28b57, by symgen 0.1.0. Do not edit; symgen generate emps --target casadi
+GENERATED from emps.yaml, sha256 819142f28b57, by symgen 0.2.0. Do not edit; symgen generate emps --target casadi
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha  d  theta   r
@@ -17,6 +17,13 @@ Base parameters, 4 of 14; Gautier and Khalil (1990), exact over F_p
     M1R = M1 + Ia1
     as they are: FV1 FS1 OFFSET1
 No effect: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1
+
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    F    force that moves a link
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
 
 Cost per sample
     regressor         0 multiplications, 0 additions, 0 sin, 0 cos
@@ -62,7 +69,6 @@ VALUES = {
     'XX1': 0.0, 'XY1': 0.0, 'XZ1': 0.0, 'YY1': 0.0, 'YZ1': 0.0, 'ZZ1': 0.0, 'MX1': 0.0, 'MY1': 0.0, 'MZ1': 0.0,
     'M1': 95.1089, 'Ia1': 0.0, 'FV1': 203.5034, 'FS1': 20.3935, 'OFFSET1': -3.1648,
 }
-_PATHS = {1: ((1, 1, ((0, 1.0),)),)}
 
 _COLUMNS = {"q": 1, "qd": 1, "qdd": 1, "tau": 1, "X": 4, "standard": 14}
 
@@ -80,10 +86,11 @@ def _function(name, reads, inputs, results):
     )
 
 
-def _modelled(name, reads, model, *labels):
-    """ca.Function of a model below, which takes each column as a list of scalars and returns a matrix, or a list of matrices."""
+def _modelled(name, reads, model, takes, *labels):
+    """ca.Function of a model below, which takes columns as lists of scalars, and constants, and returns a matrix, or a list of matrices."""
     inputs = _inputs(reads)
-    found = model(*(ca.vertsplit(x) for x in inputs[:len(reads)]), *inputs[len(reads):])
+    known = dict(zip([*reads, *CONSTANTS], [*(ca.vertsplit(x) for x in inputs[:len(reads)]), *inputs[len(reads):]]))
+    found = model(*[known[x] for x in takes])
     return _function(name, reads, inputs, dict(zip(labels, found if isinstance(found, list) else [found])))
 
 
@@ -94,19 +101,17 @@ def _derivatives(name, reads, function, result):
     return _function(name, reads, inputs, {f"d{result}_d{x}": ca.jacobian(value, inputs[k]) for k, x in enumerate(reads)})
 
 
-def _base_parameters(standard, g):
+def _base_parameters(standard):
     """X from the standard parameters."""
-    (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1
-    ) = standard
+    _, _, _, _, _, _, _, _, _, M1, Ia1, FV1, FS1, OFFSET1 = standard
     M1R = M1 + Ia1
     return ca.vertcat(
         M1R, FV1, FS1, OFFSET1,
     )
 
 
-def _regressor(q, qd, qdd, g):
-    """D, shape (1, 4), Gamma = D X."""
+def _regressor(qd, qdd):
+    """D of Gamma = D X. Shape (1, 4)."""
     D = ca.SX(4, 1)
     D[3, 0] = 1.0
     # Inputs
@@ -119,8 +124,8 @@ def _regressor(q, qd, qdd, g):
     return D.T
 
 
-def _inverse_dynamics(q, qd, qdd, X, g):
-    """Joint torques Gamma."""
+def _inverse_dynamics(qd, qdd, X):
+    """Joint torques Gamma. Shape (1, 1)."""
     GAM = ca.SX(1, 1)
     # Inputs
     QP1 = qd[0]
@@ -129,12 +134,12 @@ def _inverse_dynamics(q, qd, qdd, X, g):
     # Joint 1
     F31 = M1R*QDP1
     # Torques
-    GAM[0] = OFFSET1 + F31 + FV1*QP1 + FS1*ca.sign(QP1)
+    GAM[0, 0] = OFFSET1 + F31 + FV1*QP1 + FS1*ca.sign(QP1)
     return GAM
 
 
-def _inertia_matrix(q, X, g):
-    """A(q): column i is Gamma for a unit acceleration of joint i from rest."""
+def _inertia_matrix(X):
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (1, 1)."""
     A = ca.SX(1, 1)
     # Inputs
     M1R = X[0]
@@ -143,8 +148,8 @@ def _inertia_matrix(q, X, g):
     return A
 
 
-def _bias(q, qd, X, g):
-    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset."""
+def _bias(qd, X):
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (1, 1)."""
     GAM = ca.SX(1, 1)
     # Inputs
     QP1 = qd[0]
@@ -152,44 +157,37 @@ def _bias(q, qd, X, g):
     FS1 = X[2]
     OFFSET1 = X[3]
     # Torques
-    GAM[0] = OFFSET1 + FV1*QP1 + FS1*ca.sign(QP1)
+    GAM[0, 0] = OFFSET1 + FV1*QP1 + FS1*ca.sign(QP1)
     return GAM
 
 
-def _gravity(q, X, g):
-    """Gamma at rest without friction: gravity, offset and springs."""
+def _gravity(X):
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (1, 1)."""
     GAM = ca.SX(1, 1)
     # Inputs
     OFFSET1 = X[3]
     # Torques
-    GAM[0] = OFFSET1
+    GAM[0, 0] = OFFSET1
     return GAM
 
 
-def _frame_poses(q, g):
-    """Homogeneous transform of every frame j in frame 0."""
-    T = {}
+def _frame_poses(q):
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (1, 4, 4)."""
+    T = [ca.SX(4, 4) for _ in range(1)]
+    T[0][0, 0] = 1.0
+    T[0][1, 1] = 1.0
+    T[0][2, 2] = 1.0
+    T[0][3, 3] = 1.0
     # Inputs
     q1 = q[0]
     # Poses
-    T[0, 0, 0] = 1.0
-    T[0, 0, 1] = 0.0
-    T[0, 0, 2] = 0.0
-    T[0, 1, 0] = 0.0
-    T[0, 1, 1] = 1.0
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
-    T[0, 2, 3] = q1
-    return _poses(T)
+    T[0][2, 3] = q1
+    return T
 
 
-def _forward_dynamics(q, qd, tau, X, g):
+def _forward_dynamics(q, qd, tau, X):
     """qdd = A(q)**-1 (tau - bias)."""
-    return _solved(_inertia_matrix(q, X, g), ca.vertcat(*tau) - _bias(q, qd, X, g))
+    return _solved(_inertia_matrix(X), ca.vertcat(*tau) - _bias(qd, X))
 
 
 def _solved(A, b):
@@ -209,18 +207,12 @@ def _solved(A, b):
     return ca.vertcat(*x)
 
 
-def _poses(T):
-    """4 x 4 matrix of every frame from the entries T[frame - 1, row, column] of their first three rows."""
-    last = ca.horzcat(0.0, 0.0, 0.0, 1.0)
-    return [ca.vertcat(*(ca.horzcat(*(T[j, i, k] for k in range(4))) for i in range(3)), last) for j in range(1)]
-
-
-def _jacobian(frame, q, g):
+def _jacobian(frame, q):
     """Velocity of the origin of `frame`, then its angular velocity, in frame 0, per joint rate."""
-    T = _frame_poses(q, g)
+    T = _frame_poses(q)
     J = ca.SX(6, 1)
     P = T[frame - 1][:3, 3]
-    for j, sigma, rates in _PATHS[frame]:
+    for j, sigma, rates in _paths()[frame]:
         z = T[j - 1][:3, 2]
         v, w = (z, ca.SX(3, 1)) if sigma else (ca.cross(z, P - T[j - 1][:3, 3]), z)
         for k, rate in rates:
@@ -229,19 +221,26 @@ def _jacobian(frame, q, g):
     return J
 
 
-def jacobian_of(frame):
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 1, ((0, 1.0),)),),
+    }
+
+
+def jacobian_of(frame: int) -> ca.Function:
     """ca.Function J (6, 1) of any frame: velocity of its origin, then angular velocity, in frame 0."""
-    return _modelled(f"jacobian_{frame}", ["q"], lambda q, *constants: _jacobian(frame, q, *constants), "J")
+    return _modelled(f"jacobian_{frame}", ["q"], lambda *known: _jacobian(frame, *known), ['q'], "J")
 
 
-base_parameters = _modelled("base_parameters", ["standard"], _base_parameters, "X")
-regressor = _modelled("regressor", ["q", "qd", "qdd"], _regressor, "D")
-inverse_dynamics = _modelled("inverse_dynamics", ["q", "qd", "qdd", "X"], _inverse_dynamics, "GAM")
-inertia_matrix = _modelled("inertia_matrix", ["q", "X"], _inertia_matrix, "A")
-bias = _modelled("bias", ["q", "qd", "X"], _bias, "GAM")
-gravity = _modelled("gravity", ["q", "X"], _gravity, "GAM")
-forward_dynamics = _modelled("forward_dynamics", ["q", "qd", "tau", "X"], _forward_dynamics, "qdd")
-frame_poses = _modelled("frame_poses", ["q"], _frame_poses, "T1")
+base_parameters = _modelled("base_parameters", ["standard"], _base_parameters, ['standard'], "X")
+regressor = _modelled("regressor", ['q', 'qd', 'qdd'], _regressor, ['qd', 'qdd'], *['D'])
+inverse_dynamics = _modelled("inverse_dynamics", ['q', 'qd', 'qdd', 'X'], _inverse_dynamics, ['qd', 'qdd', 'X'], *['GAM'])
+inertia_matrix = _modelled("inertia_matrix", ['q', 'X'], _inertia_matrix, ['X'], *['A'])
+bias = _modelled("bias", ['q', 'qd', 'X'], _bias, ['qd', 'X'], *['GAM'])
+gravity = _modelled("gravity", ['q', 'X'], _gravity, ['X'], *['GAM'])
+forward_dynamics = _modelled("forward_dynamics", ['q', 'qd', 'tau', 'X'], _forward_dynamics, ['q', 'qd', 'tau', 'X'], *['qdd'])
+frame_poses = _modelled("frame_poses", ['q'], _frame_poses, ['q'], *['T1'])
 jacobian = jacobian_of(1)
 inverse_dynamics_derivatives = _derivatives("inverse_dynamics_derivatives", ["q", "qd", "qdd", "X"], inverse_dynamics, "GAM")
 forward_dynamics_derivatives = _derivatives("forward_dynamics_derivatives", ["q", "qd", "tau", "X"], forward_dynamics, "qdd")

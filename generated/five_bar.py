@@ -1,6 +1,6 @@
 """Planar five-bar linkage, 2 actuated joints, general closed loop: base parameters, regressor, dynamics.
 
-GENERATED from five_bar.yaml, sha256 2b4cc8e44743, by symgen 0.1.0. Do not edit; symgen generate five_bar
+GENERATED from five_bar.yaml, sha256 2b4cc8e44743, by symgen 0.2.0. Do not edit; symgen generate five_bar
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  mu  sigma  alpha   d  theta  r
@@ -32,6 +32,27 @@ Base parameters, 17 of 48; Gautier and Khalil (1990), recognised from 60-digit s
     as they are: MY1 FV1 FS1 OFFSET1 MY2 MY3 FV3 FS3 OFFSET3 MY4
 No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3 XX4 XY4 XZ4 YY4 YZ4 MZ4
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    th   joint angle with its constant, rad
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    G    rate of a passive joint per unit rate of an actuated one
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    P    origin of a frame in frame 0
+
 Cost per sample
     regressor         38 multiplications, 22 additions, 4 sin, 4 cos
     inverse_dynamics  49 multiplications, 36 additions, 4 sin, 4 cos
@@ -41,6 +62,9 @@ Cost per sample
     frame_poses       8 multiplications, 7 additions, 4 sin, 4 cos
     closure           8 multiplications, 10 additions, 4 sin, 4 cos
     curvature         24 multiplications, 10 additions, 4 sin, 4 cos
+
+Arguments   q, qd, qdd, tau of shape (N, 2), or (2,) for one state: results then have no axis of samples; rad or m and seconds
+            X of shape (17,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
 import numpy as np
@@ -82,17 +106,6 @@ DRIVES = None
 LIMITS = {}
 VALUES = {}
 LINKS = (1, 2, 3, 4)
-ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
-    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}), 'FV3': ('viscous', 'both', {3: 1.0}),
-    'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
-}
-_PATHS = {
-    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),))), 3: ((3, 0, ((1, 1.0),)),),
-    4: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))),
-    5: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)), (5, 0, ((1, 1.0), (3, 1.0), (0, -1.0), (2, -1.0)))),
-    6: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),))),
-}
 _START = (2.2, 0.9, -1.4637535910825177, 1.4891269023374534)
 _MODE = -1.0  # sign of det J_u in the assembly mode of _START
 
@@ -106,32 +119,29 @@ class Store(np.ndarray):
         self.ready = False
 
 
-def store(N):
+def store(N: int) -> Store:
     """Room for N samples, shape (17, 2, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
     S = np.zeros((17, 2, N)).view(Store)
-    S[5, 0] = 1.0
-    S[14, 1] = 1.0
+    S[5, 0] = S[14, 1] = 1.0
     S.ready = True
     return S
 
 
+def _states(*arrays):
+    """The states as rows of samples, shape (N, 2) each; ValueError unless all have shape (N, 2), or all (2,)."""
+    states = [np.asarray(x, dtype=float) for x in arrays]
+    shapes = [x.shape for x in states]
+    if shapes[0][-1:] != (2,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
+        raise ValueError(f"states of shape {shapes}; expected (N, 2) each, or (2,) each for one state")
+    return tuple([x.reshape(-1, 2) for x in states])
+
+
 def _fill(block, result, states, *arguments):
     """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
-    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
-    N = len(states[0])
+    N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
-    return result
-
-
-def _filled_store(q, qd, qdd, out, *constants):
-    N = np.size(q) // 2
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (17, 2, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(17, 2, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    return _fill(_regressor_block, out.view(np.ndarray), _closed(q, qd, qdd, *constants), *constants)
 
 
 def _by_sample(result, q):
@@ -140,14 +150,30 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def base_parameters(standard, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+def elements(
+    *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> dict:
+    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    return {
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}), 'FV3': ('viscous', 'both', {3: 1.0}),
+        'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
+    }
+
+
+ELEMENTS = elements()
+
+
+def base_parameters(
+    standard: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
+    g: float = 9.81
+) -> np.ndarray:
     """X, shape (17,), from the 48 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4, XY4, XZ4, YY4, YZ4, ZZ4,
-        MX4, MY4, MZ4, M4
+        _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2, MY2, _, M2, _, _, _, _, _,
+        ZZ3, MX3, MY3, _, _, Ia3, FV3, FS3, OFFSET3, _, _, _, _, _, ZZ4, MX4, MY4, _, M4
     ) = standard
     ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4
     MX1R = MX1 + L1*M2 + L1/L4*MX4
@@ -161,102 +187,163 @@ def base_parameters(standard, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9
     ])
 
 
-def regressor(q, qd, qdd, *, out=None, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
-    """D of Gamma = D X, shape (N, 2, 17); q, qd, qdd of shape (N, 2) or (2,), rad or m and seconds.
+def regressor(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, L0: float = 0.2, L1: float = 0.25,
+    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> np.ndarray:
+    """D of Gamma = D X. Shape (N, 2, 17).
 
     A view on one store of shape (17, 2, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
     faults, up to several times the arithmetic for large N.
     """
-    S = _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g)
-    D = S.transpose(2, 1, 0)
+    D = _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g).transpose(2, 1, 0)
     return D[0] if np.ndim(q) == 1 else D
 
 
-def observation_matrix(q, qd, qdd, *, out=None, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+def observation_matrix(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, L0: float = 0.2, L1: float = 0.25,
+    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> np.ndarray:
     """W of Y = W X + rho, shape (2*N, 17), Fortran order, rows joint-major: the same store, no copy."""
     return _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g).reshape(17, -1).T
 
 
-def inverse_dynamics(q, qd, qdd, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
-    """Joint torques Gamma, shape (N, 2), of base parameters X, shape (17,)."""
-    GAM = np.empty((2, np.size(q) // 2))
-    states = _closed(q, qd, qdd, L0, L1, L2, L3, L4, g)
-    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, L0, L1, L2, L3, L4, g), q)
+def _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g):
+    """`out`, or a new store, filled."""
+    states = _closed(_states(q, qd, qdd), L0, L1, L2, L3, L4)
+    N = len(states[0])
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (17, 2, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(17, 2, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    D = out.view(np.ndarray)
+    _fill(_regressor_block, D, states, L1, L3, g)
+    return D
 
 
-def inertia_matrix(q, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
-    """A(q), shape (N, 2, 2), actuators included."""
-    A = np.empty((2, 2, np.size(q) // 2))
-    states = _closed(q, None, None, L0, L1, L2, L3, L4, g)
-    return _by_sample(_fill(_inertia_matrix_block, A, states, X, L0, L1, L2, L3, L4, g), q)
+def inverse_dynamics(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25,
+    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> np.ndarray:
+    """Joint torques Gamma. Shape (N, 2)."""
+    states = _closed(_states(q, qd, qdd), L0, L1, L2, L3, L4)
+    GAM = np.zeros((2, len(states[0])))
+    _fill(_inverse_dynamics_block, GAM, states, X, L1, L3, g)
+    return _by_sample(GAM, q)
 
 
-def bias(q, qd, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
-    """Gamma at qdd = 0, shape (N, 2): Coriolis, centrifugal, gravity, friction and offset."""
-    GAM = np.empty((2, np.size(q) // 2))
-    states = _closed(q, qd, None, L0, L1, L2, L3, L4, g)
-    return _by_sample(_fill(_bias_block, GAM, states, X, L0, L1, L2, L3, L4, g), q)
+def inertia_matrix(
+    q: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
+    L4: float = 0.34, g: float = 9.81
+) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 2, 2)."""
+    states = _closed(_states(q), L0, L1, L2, L3, L4)
+    A = np.zeros((2, 2, len(states[0])))
+    _fill(_inertia_matrix_block, A, (states[0], states[3]), X, L1, L3)
+    return _by_sample(A, q)
 
 
-def gravity(q, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
-    """Gamma at rest without friction, shape (N, 2): gravity, offset and springs (a base parameter may mix them)."""
-    GAM = np.empty((2, np.size(q) // 2))
-    states = _closed(q, None, None, L0, L1, L2, L3, L4, g)
-    return _by_sample(_fill(_gravity_block, GAM, states, X, L0, L1, L2, L3, L4, g), q)
+def bias(
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
+    L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> np.ndarray:
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 2)."""
+    states = _closed(_states(q, qd), L0, L1, L2, L3, L4)
+    GAM = np.zeros((2, len(states[0])))
+    _fill(_bias_block, GAM, states, X, L1, L3, g)
+    return _by_sample(GAM, q)
 
 
-def forward_dynamics(q, qd, tau, X, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
-    """qdd = A(q)**-1 (tau - bias), shape (N, 2)."""
-    A, H = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g), bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
+def gravity(
+    q: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
+    L4: float = 0.34, g: float = 9.81
+) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 2)."""
+    states = _closed(_states(q), L0, L1, L2, L3, L4)
+    GAM = np.zeros((2, len(states[0])))
+    _fill(_gravity_block, GAM, (states[0], states[3]), X, g)
+    return _by_sample(GAM, q)
+
+
+def frame_poses(
+    q: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
+    g: float = 9.81
+) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 6, 4, 4)."""
+    states = _closed(_states(q), L0, L1, L2, L3, L4)
+    T = np.zeros((6, 4, 4, len(states[0])))
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = T[3, 3, 3] = 1.0
+    T[4, 2, 2] = T[4, 3, 3] = T[5, 2, 2] = T[5, 3, 3] = 1.0
+    _fill(_frame_poses_block, T, (states[0],), L0, L1, L2, L3, L4)
+    return _by_sample(T, q)
+
+
+def forward_dynamics(
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25,
+    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> np.ndarray:
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 2)."""
+    A, H = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4), bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
     return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
-    """Homogeneous transform of every frame j in frame 0, shape (N, 6, 4, 4), at index j - 1."""
-    T = np.zeros((6, 4, 4, np.size(q) // 2))
-    T[:, 3, 3] = 1.0
-    states = _closed(q, None, None, L0, L1, L2, L3, L4, g)
-    return _by_sample(_fill(_frame_poses_block, T, states, L0, L1, L2, L3, L4, g), q)
-
-
-def jacobian(q, *, frame=6, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
-    """J, shape (N, 6, 2): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g).reshape(-1, 6, 4, 4)
+def jacobian(
+    q: np.ndarray, *, frame: int | None = None, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
+    L4: float = 0.34, g: float = 9.81
+) -> np.ndarray:
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 2)."""
+    T = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4).reshape(-1, 6, 4, 4)
     J = np.zeros((len(T), 6, 4))
-    P = T[:, (6 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[6 if frame is None else frame]:
+    last = 6 if frame is None else frame
+    P = T[:, last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    G = _closed(q, None, None, L0, L1, L2, L3, L4, g)[3].reshape(-1, 2, 2)
+    G = _closed(_states(q), L0, L1, L2, L3, L4)[3].reshape(-1, 2, 2)
     J = J[..., :2] + J[..., 2:] @ G
     return J[0] if np.ndim(q) == 1 else J
 
 
-def passive_joints(q, qd=None, qdd=None, *, L0=0.2, L1=0.25, L2=0.36, L3=0.27, L4=0.34, g=9.81):
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)),), 3: ((3, 0, ((1, 1.0),)),),
+        4: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)), (5, 0, ((1, 1.0), (3, 1.0), (0, -1.0), (2, -1.0),)),),
+        6: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),)),),
+    }
+
+
+def passive_joints(
+    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *, L0: float = 0.2, L1: float = 0.25,
+    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> np.ndarray | tuple:
     """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also their accelerations."""
-    rates = np.array([
-        [0, 0, 1, 0],
-        [0, 0, 0, 1],
-        [-1, 1, -1, 1],
-    ], dtype=float)
-    offsets = np.array([0, 0, 0], dtype=float)
-    states = [x.reshape(*np.shape(q)[:-1], 4) for x in _closed(q, qd, qdd, L0, L1, L2, L3, L4, g)[:3]]
-    found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
+    rates = np.zeros((3, 4))
+    rates[0, 2] = 1.0
+    rates[1, 3] = 1.0
+    rates[2, 1] = 1.0
+    rates[2, 3] = 1.0
+    rates[2, 0] = -1.0
+    rates[2, 2] = -1.0
+    offsets = np.array([0.0, 0.0, 0.0])
+    given = [x is not None for x in (q, qd, qdd)]
+    states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
+    states = _closed(states, L0, L1, L2, L3, L4)[:3]
+    found = [(x @ rates.T).reshape(*np.shape(q)[:-1], 3) for x, wanted in zip(states, given) if wanted]
     found[0] += offsets
     return found[0] if len(found) == 1 else tuple(found)
 
 
-def _closed(q, qd, qdd, *constants):
+def _closed(states, L0, L1, L2, L3, L4):
     """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 4), and G (N, 2*2), rates of the tied ones."""
-    q = np.atleast_2d(np.asarray(q, dtype=float))
+    q, qd, qdd = (*states, *[np.zeros_like(states[0])] * (3 - len(states)))
     N = len(q)
-    qd = np.zeros_like(q) if qd is None else np.atleast_2d(np.asarray(qd, dtype=float))
-    qdd = np.zeros_like(q) if qdd is None else np.atleast_2d(np.asarray(qdd, dtype=float))
-    q = np.concatenate([q, _assembled(q, *constants)], axis=1)
-    J = _fill(_closure_block, np.empty((2, 5, N)), (q,), *constants)[:, 1:]
+    q = np.concatenate([q, _assembled(q, L0, L1, L2, L3, L4)], axis=1)
+    J = _closure((q,), L0, L1, L2, L3, L4)[:, 1:]
     J_a, J_u = J[:, :2], J[:, 2:]
     volume = _determinant(J_u) / np.prod(np.sqrt((J**2).sum(axis=1)), axis=0)
     if (np.abs(volume) < 1e-6).any():  # a dead point is found to half the digits of the closure
@@ -264,7 +351,7 @@ def _closed(q, qd, qdd, *constants):
         raise ValueError(f"singular configuration at sample {t}: q = {q[t, :2]}, tied joints {q[t, 2:]} move freely there")
     G = -_solved(J_u, J_a)
     qd = np.concatenate([qd, np.einsum("uit,ti->tu", G, qd)], axis=1)
-    B = _fill(_curvature_block, np.empty((2, N)), (q, qd), *constants)
+    B = _curvature((q, qd), L1, L2, L3, L4)
     other = (volume * _MODE < 0) | (B[2:] < 0).any(axis=0)  # beyond a dead point, or frames opposite (trace -1, not 3)
     if other.any():
         t = int(other.argmax())
@@ -273,7 +360,21 @@ def _closed(q, qd, qdd, *constants):
     return q, qd, qdd, G.reshape(4, N).T
 
 
-def _assembled(q, *constants):
+def _closure(states, L0, L1, L2, L3, L4):
+    """Closure residuals, then their derivatives by the joints. Shape (2, 5, N)."""
+    R = np.zeros((2, 5, len(states[0])))
+    _fill(_closure_block, R, (states[0],), L0, L1, L2, L3, L4)
+    return R
+
+
+def _curvature(states, L1, L2, L3, L4):
+    """Second derivatives of the residuals at constant rates, then traces of A_cut' A_twin. Shape (2, N)."""
+    B = np.zeros((2, len(states[0])))
+    _fill(_curvature_block, B, (states[0], states[1]), L1, L2, L3, L4)
+    return B
+
+
+def _assembled(q, L0, L1, L2, L3, L4):
     """Tied joints (N, 2) that close the loops, in the assembly mode of _START and continuous in q.
 
     Along a smooth record only knots are followed from _START; the samples between them start from interpolation.
@@ -286,21 +387,21 @@ def _assembled(q, *constants):
     away = q[knots] - start
     steps = int(np.ceil(np.abs(away).max(initial=0.0) / 0.2))
     for s in range(1, steps):
-        x, _ = _newton(start + s / steps * away, x, 2, *constants)
-    x, residual = _newton(q[knots], x, 20, *constants)
+        x, _ = _newton(start + s / steps * away, x, 2, L0, L1, L2, L3, L4)
+    x, residual = _newton(q[knots], x, 20, L0, L1, L2, L3, L4)
     if every > 1:
         x = np.stack([np.interp(np.arange(N), knots, column) for column in x.T], axis=1)
-        x, residual = _newton(q, x, 5, *constants)
+        x, residual = _newton(q, x, 5, L0, L1, L2, L3, L4)
     if not (residual < 1e-10).all():
         t = int((~(residual < 1e-10)).argmax())
         raise ValueError(f"the mechanism does not close at sample {t}: residual {residual[t]:.3g} at q = {q[t]}")
     return x
 
 
-def _newton(q, x, passes, *constants):
+def _newton(q, x, passes, L0, L1, L2, L3, L4):
     """At most `passes` Newton steps on the tied joints x; returns x and the largest residual of each sample."""
     for k in range(passes + 1):
-        R = _fill(_closure_block, np.empty((2, 5, len(q))), (np.concatenate([q, x], axis=1),), *constants)
+        R = _closure((np.concatenate([q, x], axis=1),), L0, L1, L2, L3, L4)
         residual = np.abs(R[:, 0]).max(axis=0)
         if k == passes or not residual.max(initial=0.0) > 1e-13:
             return x, residual
@@ -319,16 +420,13 @@ def _solved(J, b):
     return np.stack([J22*b[0] - J12*b[1], J11*b[1] - J21*b[0]]) / _determinant(J)
 
 
-def _regressor_block(q, qd, qdd, G, D, L0, L1, L2, L3, L4, g):
-    """Fill D, shape (17, 2, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (4, N); G: (2*2, N)."""
+def _regressor_block(q, qd, qdd, G, D, L1, L3, g):
+    """Fill D, shape (17, 2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
     QDP1, QDP3, QDP2, QDP4 = qdd
-    G21 = G[0]
-    G23 = G[1]
-    G41 = G[2]
-    G43 = G[3]
+    G21, G23, G41, G43 = G
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -391,16 +489,13 @@ def _regressor_block(q, qd, qdd, G, D, L0, L1, L2, L3, L4, g):
     D[16, 1] = -VP14 - WP34*V143 - DV334*V243 - VP14*G43  # DG3MY4
 
 
-def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
-    """Fill GAM, shape (2, N). q, qd, qdd: (4, N); G: (2*2, N)."""
+def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L1, L3, g):
+    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
     QDP1, QDP3, QDP2, QDP4 = qdd
-    G21 = G[0]
-    G23 = G[1]
-    G41 = G[2]
-    G43 = G[3]
+    G21, G23, G41, G43 = G
     ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3, ZZ4R, MY4 = X
     # Trigonometry
     C1 = np.cos(q1)
@@ -455,15 +550,12 @@ def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
     GAM[1] = OFFSET3 + NE33 + FV3*QP3 + FS3*np.sign(QP3) + N32*G23 + N34*G43
 
 
-def _inertia_matrix_block(q, qd, qdd, G, A, X, L0, L1, L2, L3, L4, g):
-    """Fill A, shape (2, 2, N): column i is Gamma for a unit acceleration of joint i from rest. q, qd, qdd: (4, N); G: (2*2, N)."""
+def _inertia_matrix_block(q, G, A, X, L1, L3):
+    """Fill A, shape (2, 2, N), where it is not constant, from q (4, N); G (4, N)."""
     # Inputs
     q2 = q[2]
     q4 = q[3]
-    G21 = G[0]
-    G23 = G[1]
-    G41 = G[2]
-    G43 = G[3]
+    G21, G23, G41, G43 = G
     ZZ1R = X[0]
     ZZ2R = X[6]
     MX2R = X[7]
@@ -508,17 +600,14 @@ def _inertia_matrix_block(q, qd, qdd, G, A, X, L0, L1, L2, L3, L4, g):
     A[1, 1] = NE333 + G23*N323 + G43*N343
 
 
-def _bias_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
-    """Fill GAM, shape (2, N), for qdd = 0. q, qd, qdd: (4, N); G: (2*2, N)."""
+def _bias_block(q, qd, qdd, G, GAM, X, L1, L3, g):
+    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
     QDP2 = qdd[2]
     QDP4 = qdd[3]
-    G21 = G[0]
-    G23 = G[1]
-    G41 = G[2]
-    G43 = G[3]
+    G21, G23, G41, G43 = G
     MX1R = X[1]
     MY1 = X[2]
     FV1 = X[3]
@@ -583,14 +672,11 @@ def _bias_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
     GAM[1] = OFFSET3 + NE33 + FV3*QP3 + FS3*np.sign(QP3) + N32*G23 + N34*G43
 
 
-def _gravity_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
-    """Fill GAM, shape (2, N), at rest. q, qd, qdd: (4, N); G: (2*2, N)."""
+def _gravity_block(q, G, GAM, X, g):
+    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); G (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
-    G21 = G[0]
-    G23 = G[1]
-    G41 = G[2]
-    G43 = G[3]
+    G21, G23, G41, G43 = G
     MX1R = X[1]
     MY1 = X[2]
     OFFSET1 = X[5]
@@ -635,8 +721,8 @@ def _gravity_block(q, qd, qdd, G, GAM, X, L0, L1, L2, L3, L4, g):
     GAM[1] = OFFSET3 + NE33 + N32*G23 + N34*G43
 
 
-def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, L4, g):
-    """Fill T, shape (6, 4, 4, N). q, qd, qdd: (4, N); G: (2*2, N)."""
+def _frame_poses_block(q, T, L0, L1, L2, L3, L4):
+    """Fill T, shape (6, 4, 4, N), where it is not constant, from q (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     # Trigonometry
@@ -665,80 +751,41 @@ def _frame_poses_block(q, qd, qdd, G, T, L0, L1, L2, L3, L4, g):
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 0, 2] = 0.0
     T[0, 1, 0] = S1
     T[0, 1, 1] = C1
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
-    T[0, 2, 3] = 0.0
     T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
-    T[1, 0, 2] = 0.0
+    T[1, 0, 3] = P12
     T[1, 1, 0] = S12
     T[1, 1, 1] = C12
-    T[1, 1, 2] = 0.0
-    T[1, 2, 0] = 0.0
-    T[1, 2, 1] = 0.0
-    T[1, 2, 2] = 1.0
-    T[1, 0, 3] = P12
     T[1, 1, 3] = P22
-    T[1, 2, 3] = 0.0
     T[2, 0, 0] = C3
     T[2, 0, 1] = -S3
-    T[2, 0, 2] = 0.0
+    T[2, 0, 3] = L0
     T[2, 1, 0] = S3
     T[2, 1, 1] = C3
-    T[2, 1, 2] = 0.0
-    T[2, 2, 0] = 0.0
-    T[2, 2, 1] = 0.0
-    T[2, 2, 2] = 1.0
-    T[2, 0, 3] = L0
-    T[2, 1, 3] = 0.0
-    T[2, 2, 3] = 0.0
     T[3, 0, 0] = C34
     T[3, 0, 1] = -S34
-    T[3, 0, 2] = 0.0
+    T[3, 0, 3] = P14
     T[3, 1, 0] = S34
     T[3, 1, 1] = C34
-    T[3, 1, 2] = 0.0
-    T[3, 2, 0] = 0.0
-    T[3, 2, 1] = 0.0
-    T[3, 2, 2] = 1.0
-    T[3, 0, 3] = P14
     T[3, 1, 3] = P24
-    T[3, 2, 3] = 0.0
     T[4, 0, 0] = C34
     T[4, 0, 1] = -S34
-    T[4, 0, 2] = 0.0
+    T[4, 0, 3] = P15
     T[4, 1, 0] = S34
     T[4, 1, 1] = C34
-    T[4, 1, 2] = 0.0
-    T[4, 2, 0] = 0.0
-    T[4, 2, 1] = 0.0
-    T[4, 2, 2] = 1.0
-    T[4, 0, 3] = P15
     T[4, 1, 3] = P25
-    T[4, 2, 3] = 0.0
     T[5, 0, 0] = C34
     T[5, 0, 1] = -S34
-    T[5, 0, 2] = 0.0
+    T[5, 0, 3] = P16
     T[5, 1, 0] = S34
     T[5, 1, 1] = C34
-    T[5, 1, 2] = 0.0
-    T[5, 2, 0] = 0.0
-    T[5, 2, 1] = 0.0
-    T[5, 2, 2] = 1.0
-    T[5, 0, 3] = P16
     T[5, 1, 3] = P26
-    T[5, 2, 3] = 0.0
 
 
-def _closure_block(q, R, L0, L1, L2, L3, L4, g):
-    """Fill R, shape (2, 1 + 4, N): closure residuals, then their derivatives by the joints. q: (4, N)."""
+def _closure_block(q, R, L0, L1, L2, L3, L4):
+    """Fill R, shape (2, 5, N), where it is not constant, from q (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     # Trigonometry
@@ -771,19 +818,19 @@ def _closure_block(q, R, L0, L1, L2, L3, L4, g):
     P26 = P24 + S34L4
     # Residuals and their derivatives by the joints
     R[0, 0] = P15 - P16
-    R[1, 0] = P25 - P26
     R[0, 1] = -P25
     R[0, 2] = P26
     R[0, 3] = -S12L2
     R[0, 4] = S34L4
+    R[1, 0] = P25 - P26
     R[1, 1] = P15
     R[1, 2] = -C3L3 - C34L4
     R[1, 3] = C12L2
     R[1, 4] = -C34L4
 
 
-def _curvature_block(q, qd, B, L0, L1, L2, L3, L4, g):
-    """Fill B, shape (2 + 0, N): second derivatives of the residuals at constant rates, then traces of A_cut' A_twin. q, qd: (4, N)."""
+def _curvature_block(q, qd, B, L1, L2, L3, L4):
+    """Fill B, shape (2, N), where it is not constant, from q (4, N); qd (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd

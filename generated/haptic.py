@@ -1,6 +1,6 @@
 """Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.1.0. Do not edit; symgen generate haptic
+GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.2.0. Do not edit; symgen generate haptic
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  mu  sigma  alpha    d  theta  r
@@ -52,6 +52,32 @@ Base parameters, 30 of 78; Gautier and Khalil (1990), exact over F_p
     as they are: MX1 FV1 FS1 OFFSET1 MY2 OFFSET2 MY3 MY5 OFFSET5 MY6
 No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 M2 XZ4 YZ4 ZZ4 M5
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    th   joint angle with its constant, rad
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    DW   differences of their squares
+    U    skew(WP) + skew(W)**2
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    Z    axis of a joint, in the frame of a later link
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    VS   the same, in the antecedent's frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    E    force transmitted to a link by its antecedent, in its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    R    orientation of a frame in frame 0
+    P    origin of a frame in frame 0
+
 Cost per sample
     regressor         101 multiplications, 63 additions, 6 sin, 6 cos
     inverse_dynamics  141 multiplications, 123 additions, 6 sin, 6 cos
@@ -59,6 +85,9 @@ Cost per sample
     bias              131 multiplications, 98 additions, 6 sin, 6 cos
     gravity           46 multiplications, 35 additions, 5 sin, 5 cos
     frame_poses       21 multiplications, 6 additions, 4 sin, 4 cos
+
+Arguments   q, qd, qdd, tau of shape (N, 3), or (3,) for one state: results then have no axis of samples; rad or m and seconds
+            X of shape (30,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
 import numpy as np
@@ -129,24 +158,6 @@ VALUES = {
     'FSP2': 0.02, 'FSP5': 0.02,
 }
 LINKS = (1, 2, 3, 4, 5, 6)
-ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
-    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}),
-    'FS4': ('coulomb', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
-    'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}),
-    'FVP2': ('viscous', 'both', {2: 1.0}), 'FVP5': ('viscous', 'both', {5: 1.0}), 'FSP2': ('coulomb', 'both', {2: 1.0}),
-    'FSP5': ('coulomb', 'both', {5: 1.0}),
-}
-_PATHS = {
-    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
-    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0)))),
-    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0))), (4, 0, ((2, -1.0),))),
-    5: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),))),
-    6: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0)))),
-    7: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0))), (7, 0, ((1, -1.0), (2, 1.0)))),
-    8: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0)))),
-}
 
 
 class Store(np.ndarray):
@@ -158,33 +169,29 @@ class Store(np.ndarray):
         self.ready = False
 
 
-def store(N):
+def store(N: int) -> Store:
     """Room for N samples, shape (30, 3, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
     S = np.zeros((30, 3, N)).view(Store)
-    S[5, 0] = 1.0
-    S[15, 1] = 1.0
-    S[28, 2] = 1.0
+    S[5, 0] = S[15, 1] = S[28, 2] = 1.0
     S.ready = True
     return S
 
 
+def _states(*arrays):
+    """The states as rows of samples, shape (N, 3) each; ValueError unless all have shape (N, 3), or all (3,)."""
+    states = [np.asarray(x, dtype=float) for x in arrays]
+    shapes = [x.shape for x in states]
+    if shapes[0][-1:] != (3,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
+        raise ValueError(f"states of shape {shapes}; expected (N, 3) each, or (3,) each for one state")
+    return tuple([x.reshape(-1, 3) for x in states])
+
+
 def _fill(block, result, states, *arguments):
     """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
-    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
-    N = len(states[0])
+    N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
-    return result
-
-
-def _filled_store(q, qd, qdd, out, *constants):
-    N = np.size(q) // 3
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (30, 3, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(30, 3, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
 
 
 def _by_sample(result, q):
@@ -193,15 +200,34 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def base_parameters(standard, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+def elements(*, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0) -> dict:
+    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    return {
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}),
+        'FS4': ('coulomb', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
+        'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}),
+        'FVP2': ('viscous', 'both', {2: 1.0}), 'FVP5': ('viscous', 'both', {5: 1.0}), 'FSP2': ('coulomb', 'both', {2: 1.0}),
+        'FSP5': ('coulomb', 'both', {5: 1.0}),
+    }
+
+
+ELEMENTS = elements()
+
+
+def base_parameters(
+    standard: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
+    gy: float = 0.0
+) -> np.ndarray:
     """X, shape (30,), from the 78 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, XX4, XY4, XZ4, YY4, YZ4, ZZ4,
-        MX4, MY4, MZ4, M4, FV4, FS4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6,
-        XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, FVP2, FVP5, FSP2, FSP5
+        _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, MZ2, _, Ia2,
+        FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, XX4, XY4, _, YY4, _, _, MX4, MY4, MZ4, M4,
+        FV4, FS4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, _, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6,
+        MX6, MY6, MZ6, M6, FVP2, FVP5, FSP2, FSP5
     ) = standard
     ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + np.sin(c)**2*XX4 + 2*np.cos(c)*np.sin(c)*XY4 + np.cos(c)**2*YY4 + (D3**2 + D4**2)*M4 + D6**2*M6
     MY1R = MY1 + MZ2 + MZ3 + MZ4 + MZ5 + MZ6
@@ -229,70 +255,116 @@ def base_parameters(standard, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.
     ])
 
 
-def regressor(q, qd, qdd, *, out=None, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
-    """D of Gamma = D X, shape (N, 3, 30); q, qd, qdd of shape (N, 3) or (3,), rad or m and seconds.
+def regressor(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D3: float = 0.2, D4: float = 0.22,
+    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> np.ndarray:
+    """D of Gamma = D X. Shape (N, 3, 30).
 
     A view on one store of shape (30, 3, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
     faults, up to several times the arithmetic for large N.
     """
-    S = _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy)
-    D = S.transpose(2, 1, 0)
+    D = _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy).transpose(2, 1, 0)
     return D[0] if np.ndim(q) == 1 else D
 
 
-def observation_matrix(q, qd, qdd, *, out=None, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+def observation_matrix(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D3: float = 0.2, D4: float = 0.22,
+    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> np.ndarray:
     """W of Y = W X + rho, shape (3*N, 30), Fortran order, rows joint-major: the same store, no copy."""
     return _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy).reshape(30, -1).T
 
 
-def inverse_dynamics(q, qd, qdd, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
-    """Joint torques Gamma, shape (N, 3), of base parameters X, shape (30,)."""
-    GAM = np.empty((3, np.size(q) // 3))
-    states = (q, qd, qdd)
-    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D3, D4, D6, c, gx, gy), q)
+def _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy):
+    """`out`, or a new store, filled."""
+    states = _states(q, qd, qdd)
+    N = len(states[0])
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (30, 3, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(30, 3, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    D = out.view(np.ndarray)
+    _fill(_regressor_block, D, states, D3, D4, D6, c, gx, gy)
+    return D
 
 
-def inertia_matrix(q, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
-    """A(q), shape (N, 3, 3), actuators included."""
-    A = np.empty((3, 3, np.size(q) // 3))
-    states = (q,)
-    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D3, D4, D6, c, gx, gy), q)
+def inverse_dynamics(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22,
+    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> np.ndarray:
+    """Joint torques Gamma. Shape (N, 3)."""
+    states = _states(q, qd, qdd)
+    GAM = np.zeros((3, len(states[0])))
+    _fill(_inverse_dynamics_block, GAM, states, X, D3, D4, D6, c, gx, gy)
+    return _by_sample(GAM, q)
 
 
-def bias(q, qd, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
-    """Gamma at qdd = 0, shape (N, 3): Coriolis, centrifugal, gravity, friction and offset."""
-    GAM = np.empty((3, np.size(q) // 3))
-    states = (q, qd)
-    return _by_sample(_fill(_bias_block, GAM, states, X, D3, D4, D6, c, gx, gy), q)
+def inertia_matrix(
+    q: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
+    gx: float = -9.81, gy: float = 0.0
+) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 3, 3)."""
+    states = _states(q)
+    A = np.zeros((3, 3, len(states[0])))
+    _fill(_inertia_matrix_block, A, states, X, D3, D4, D6, c)
+    return _by_sample(A, q)
 
 
-def gravity(q, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
-    """Gamma at rest without friction, shape (N, 3): gravity, offset and springs (a base parameter may mix them)."""
-    GAM = np.empty((3, np.size(q) // 3))
-    states = (q,)
-    return _by_sample(_fill(_gravity_block, GAM, states, X, D3, D4, D6, c, gx, gy), q)
+def bias(
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
+    gx: float = -9.81, gy: float = 0.0
+) -> np.ndarray:
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 3)."""
+    states = _states(q, qd)
+    GAM = np.zeros((3, len(states[0])))
+    _fill(_bias_block, GAM, states, X, D3, D4, D6, c, gx, gy)
+    return _by_sample(GAM, q)
 
 
-def forward_dynamics(q, qd, tau, X, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
-    """qdd = A(q)**-1 (tau - bias), shape (N, 3)."""
-    A, H = inertia_matrix(q, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy), bias(q, qd, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
+def gravity(
+    q: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
+    gx: float = -9.81, gy: float = 0.0
+) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 3)."""
+    states = _states(q)
+    GAM = np.zeros((3, len(states[0])))
+    _fill(_gravity_block, GAM, states, X, c, gx, gy)
+    return _by_sample(GAM, q)
+
+
+def frame_poses(
+    q: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
+    gy: float = 0.0
+) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 8, 4, 4)."""
+    states = _states(q)
+    T = np.zeros((8, 4, 4, len(states[0])))
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = T[6, 3, 3] = 1.0
+    T[7, 3, 3] = 1.0
+    _fill(_frame_poses_block, T, states, D3, D4, D6, c)
+    return _by_sample(T, q)
+
+
+def forward_dynamics(
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22,
+    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> np.ndarray:
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 3)."""
+    A, H = inertia_matrix(q, X, D3=D3, D4=D4, D6=D6, c=c), bias(q, qd, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
     return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
-    """Homogeneous transform of every frame j in frame 0, shape (N, 8, 4, 4), at index j - 1."""
-    T = np.zeros((8, 4, 4, np.size(q) // 3))
-    T[:, 3, 3] = 1.0
-    states = (q,)
-    return _by_sample(_fill(_frame_poses_block, T, states, D3, D4, D6, c, gx, gy), q)
-
-
-def jacobian(q, *, frame=8, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
-    """J, shape (N, 6, 3): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy).reshape(-1, 8, 4, 4)
+def jacobian(
+    q: np.ndarray, *, frame: int | None = None, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
+    gx: float = -9.81, gy: float = 0.0
+) -> np.ndarray:
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 3)."""
+    T = frame_poses(q, D3=D3, D4=D4, D6=D6, c=c).reshape(-1, 8, 4, 4)
     J = np.zeros((len(T), 6, 3))
-    P = T[:, (8 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[8 if frame is None else frame]:
+    last = 8 if frame is None else frame
+    P = T[:, last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -301,23 +373,42 @@ def jacobian(q, *, frame=8, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
     return J[0] if np.ndim(q) == 1 else J
 
 
-def passive_joints(q, qd=None, qdd=None, *, D3=0.2, D4=0.22, D6=0.1, c=0.0, gx=-9.81, gy=0.0):
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
+        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)), (4, 0, ((2, -1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)),),
+        6: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0),)),),
+        7: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0),)), (7, 0, ((1, -1.0), (2, 1.0),)),),
+        8: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)),),
+    }
+
+
+def passive_joints(
+    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *, D3: float = 0.2, D4: float = 0.22,
+    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> np.ndarray | tuple:
     """Positions of the joints PASSIVE, shape (N, 4); with qd also their velocities, with qdd also their accelerations."""
-    rates = np.array([
-        [0, -1, 1],
-        [0, 0, -1],
-        [0, 1, -1],
-        [0, -1, 1],
-    ], dtype=float)
-    offsets = np.array([np.pi, c, 0, np.pi], dtype=float)
-    states = [q, qd, qdd]
-    found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
+    rates = np.zeros((4, 3))
+    rates[0, 1] = -1.0
+    rates[0, 2] = 1.0
+    rates[1, 2] = -1.0
+    rates[2, 1] = 1.0
+    rates[2, 2] = -1.0
+    rates[3, 1] = -1.0
+    rates[3, 2] = 1.0
+    offsets = np.array([np.pi, c, 0.0, np.pi])
+    given = [x is not None for x in (q, qd, qdd)]
+    states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
+    found = [(x @ rates.T).reshape(*np.shape(q)[:-1], 4) for x, wanted in zip(states, given) if wanted]
     found[0] += offsets
     return found[0] if len(found) == 1 else tuple(found)
 
 
 def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
-    """Fill D, shape (30, 3, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (3, N)."""
+    """Fill D, shape (30, 3, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N)."""
     # Inputs
     q1, q2, q5 = q
     QP1, QP2, QP5 = qd
@@ -344,12 +435,12 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
-    U232 = S2*QDP1
-    U132 = -C2*QDP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV232 = QP2*W22
-    WP12 = DV232 - U232
+    WP12 = DV232 - S2QDP1
     DV132 = QP2*W12
-    WP22 = U132 - DV132
+    WP22 = -C2QDP1 - DV132
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -368,12 +459,12 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     # Link 3
     W13 = S5*QP1
     W23 = C5*QP1
-    U233 = -S5*QDP1
-    U133 = C5*QDP1
+    S5QDP1 = S5*QDP1
+    C5QDP1 = C5*QDP1
     DV233 = QP5*W23
-    WP13 = DV233 - U233
+    WP13 = S5QDP1 + DV233
     DV133 = QP5*W13
-    WP23 = U133 - DV133
+    WP23 = C5QDP1 - DV133
     DV113 = W13**2
     DV123 = W13*W23
     DV223 = W23**2
@@ -452,8 +543,8 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     # Joint 2
     D[6, 1] = -DV122                                           # DG2XX2
     D[7, 1] = DW122                                            # DG2XY2
-    D[8, 1] = -U232                                            # DG2XZ2
-    D[9, 1] = U132                                             # DG2YZ2
+    D[8, 1] = -S2QDP1                                          # DG2XZ2
+    D[9, 1] = -C2QDP1                                          # DG2YZ2
     D[10, 1] = QDP2                                            # DG2ZZ2
     D[11, 1] = VP22                                            # DG2MX2
     D[12, 1] = -VP12                                           # DG2MY2
@@ -466,8 +557,8 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     # Joint 5
     D[16, 2] = -DV123                 # DG5XX3
     D[17, 2] = DW123                  # DG5XY3
-    D[18, 2] = -U233                  # DG5XZ3
-    D[19, 2] = U133                   # DG5YZ3
+    D[18, 2] = S5QDP1                 # DG5XZ3
+    D[19, 2] = C5QDP1                 # DG5YZ3
     D[20, 2] = QDP5                   # DG5ZZ3
     D[21, 2] = VP23                   # DG5MX3
     D[22, 2] = -VP13                  # DG5MY3
@@ -480,7 +571,7 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
 
 
 def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
-    """Fill GAM, shape (3, N). q, qd, qdd: (3, N)."""
+    """Fill GAM, shape (3, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N)."""
     # Inputs
     q1, q2, q5 = q
     QP1, QP2, QP5 = qd
@@ -628,8 +719,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     GAM[2] = NE33 + OFFSET5 + NE35 + FV5R*QP5 + FS5R*np.sign(QP5) - N34 - N36
 
 
-def _inertia_matrix_block(q, A, X, D3, D4, D6, c, gx, gy):
-    """Fill A, shape (3, 3, N): column i is Gamma for a unit acceleration of joint i from rest. q: (3, N)."""
+def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
+    """Fill A, shape (3, 3, N), where it is not constant, from q (3, N)."""
     # Inputs
     q2 = q[1]
     q5 = q[2]
@@ -723,7 +814,7 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c, gx, gy):
 
 
 def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
-    """Fill GAM, shape (3, N), for qdd = 0. q, qd: (3, N)."""
+    """Fill GAM, shape (3, N), where it is not constant, from q (3, N); qd (3, N)."""
     # Inputs
     q1, q2, q5 = q
     QP1, QP2, QP5 = qd
@@ -878,8 +969,8 @@ def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
     GAM[2] = NE33 + OFFSET5 + NE35 + FV5R*QP5 + FS5R*np.sign(QP5) - N34 - N36
 
 
-def _gravity_block(q, GAM, X, D3, D4, D6, c, gx, gy):
-    """Fill GAM, shape (3, N), at rest. q: (3, N)."""
+def _gravity_block(q, GAM, X, c, gx, gy):
+    """Fill GAM, shape (3, N), where it is not constant, from q (3, N)."""
     # Inputs
     q1, q2, q5 = q
     MX1 = X[1]
@@ -960,8 +1051,8 @@ def _gravity_block(q, GAM, X, D3, D4, D6, c, gx, gy):
     GAM[2] = NE33 + OFFSET5 + NE35 - N34 - N36
 
 
-def _frame_poses_block(q, T, D3, D4, D6, c, gx, gy):
-    """Fill T, shape (8, 4, 4, N). q: (3, N)."""
+def _frame_poses_block(q, T, D3, D4, D6, c):
+    """Fill T, shape (8, 4, 4, N), where it is not constant, from q (3, N)."""
     # Inputs
     q1, q2, q5 = q
     # Constants
@@ -1006,16 +1097,8 @@ def _frame_poses_block(q, T, D3, D4, D6, c, gx, gy):
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 0, 2] = 0.0
     T[0, 1, 0] = S1
     T[0, 1, 1] = C1
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
-    T[0, 2, 3] = 0.0
     T[1, 0, 0] = R112
     T[1, 0, 1] = R122
     T[1, 0, 2] = -S1
@@ -1024,33 +1107,27 @@ def _frame_poses_block(q, T, D3, D4, D6, c, gx, gy):
     T[1, 1, 2] = C1
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[1, 2, 2] = 0.0
-    T[1, 0, 3] = 0.0
-    T[1, 1, 3] = 0.0
-    T[1, 2, 3] = 0.0
     T[2, 0, 0] = R113
     T[2, 0, 1] = R123
     T[2, 0, 2] = -S1
+    T[2, 0, 3] = P13
     T[2, 1, 0] = R213
     T[2, 1, 1] = R223
     T[2, 1, 2] = C1
+    T[2, 1, 3] = P23
     T[2, 2, 0] = S5
     T[2, 2, 1] = C5
-    T[2, 2, 2] = 0.0
-    T[2, 0, 3] = P13
-    T[2, 1, 3] = P23
     T[2, 2, 3] = P33
     T[3, 0, 0] = R114
     T[3, 0, 1] = R124
     T[3, 0, 2] = -S1
+    T[3, 0, 3] = P14
     T[3, 1, 0] = R214
     T[3, 1, 1] = R224
     T[3, 1, 2] = C1
+    T[3, 1, 3] = P24
     T[3, 2, 0] = R314
     T[3, 2, 1] = R324
-    T[3, 2, 2] = 0.0
-    T[3, 0, 3] = P14
-    T[3, 1, 3] = P24
     T[3, 2, 3] = P34
     T[4, 0, 0] = -R113
     T[4, 0, 1] = -R123
@@ -1060,43 +1137,36 @@ def _frame_poses_block(q, T, D3, D4, D6, c, gx, gy):
     T[4, 1, 2] = C1
     T[4, 2, 0] = -S5
     T[4, 2, 1] = -C5
-    T[4, 2, 2] = 0.0
-    T[4, 0, 3] = 0.0
-    T[4, 1, 3] = 0.0
-    T[4, 2, 3] = 0.0
     T[5, 0, 0] = R112
     T[5, 0, 1] = R122
     T[5, 0, 2] = -S1
+    T[5, 0, 3] = P16
     T[5, 1, 0] = R212
     T[5, 1, 1] = R222
     T[5, 1, 2] = C1
+    T[5, 1, 3] = P26
     T[5, 2, 0] = -S2
     T[5, 2, 1] = -C2
-    T[5, 2, 2] = 0.0
-    T[5, 0, 3] = P16
-    T[5, 1, 3] = P26
     T[5, 2, 3] = P36
     T[6, 0, 0] = R113
     T[6, 0, 1] = R123
     T[6, 0, 2] = -S1
+    T[6, 0, 3] = P17
     T[6, 1, 0] = R213
     T[6, 1, 1] = R223
     T[6, 1, 2] = C1
+    T[6, 1, 3] = P27
     T[6, 2, 0] = S5
     T[6, 2, 1] = C5
-    T[6, 2, 2] = 0.0
-    T[6, 0, 3] = P17
-    T[6, 1, 3] = P27
     T[6, 2, 3] = P37
     T[7, 0, 0] = R113
     T[7, 0, 1] = R123
     T[7, 0, 2] = -S1
+    T[7, 0, 3] = P17
     T[7, 1, 0] = R213
     T[7, 1, 1] = R223
     T[7, 1, 2] = C1
+    T[7, 1, 3] = P27
     T[7, 2, 0] = S5
     T[7, 2, 1] = C5
-    T[7, 2, 2] = 0.0
-    T[7, 0, 3] = P17
-    T[7, 1, 3] = P27
     T[7, 2, 3] = P37

@@ -1,6 +1,6 @@
 """Franka Emika Panda, 7 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.1.0. Do not edit; symgen generate panda
+GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.2.0. Do not edit; symgen generate panda
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha    d  theta    r
@@ -47,6 +47,31 @@ Base parameters, 69 of 98; Gautier and Khalil (1990), exact over F_p
         XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5 OFFSET5 XZ6 YZ6 Ia6 FV6 FS6 OFFSET6 XY7 XZ7 YZ7 ZZ7 MX7 MY7 Ia7 FV7 FS7 OFFSET7
 No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    DW   differences of their squares
+    U    skew(WP) + skew(W)**2
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    Z    axis of a joint, in the frame of a later link
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    VS   the same, in the antecedent's frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    E    force transmitted to a link by its antecedent, in its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    R    orientation of a frame in frame 0
+    P    origin of a frame in frame 0
+
 Cost per sample
     regressor         684 multiplications, 497 additions, 6 sin, 6 cos
     inverse_dynamics  333 multiplications, 323 additions, 6 sin, 6 cos
@@ -54,6 +79,9 @@ Cost per sample
     bias              322 multiplications, 299 additions, 6 sin, 6 cos
     gravity           64 multiplications, 45 additions, 6 sin, 6 cos
     frame_poses       77 multiplications, 41 additions, 7 sin, 7 cos
+
+Arguments   q, qd, qdd, tau of shape (N, 7), or (7,) for one state: results then have no axis of samples; rad or m and seconds
+            X of shape (69,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
 import numpy as np
@@ -131,26 +159,6 @@ LIMITS = {
 }
 VALUES = {}
 LINKS = (1, 2, 3, 4, 5, 6, 7)
-ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
-    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
-    'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
-    'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
-    'OFFSET4': ('offset', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
-    'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}),
-    'FV6': ('viscous', 'both', {6: 1.0}), 'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}),
-    'Ia7': ('inertia', 'both', {7: 1.0}), 'FV7': ('viscous', 'both', {7: 1.0}), 'FS7': ('coulomb', 'both', {7: 1.0}),
-    'OFFSET7': ('offset', 'both', {7: 1.0}),
-}
-_PATHS = {
-    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
-    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),))),
-    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
-    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),))),
-    6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),))),
-    7: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),)), (7, 0, ((6, 1.0),))),
-}
 
 
 class Store(np.ndarray):
@@ -162,37 +170,29 @@ class Store(np.ndarray):
         self.ready = False
 
 
-def store(N):
+def store(N: int) -> Store:
     """Room for N samples, shape (69, 7, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
     S = np.zeros((69, 7, N)).view(Store)
-    S[3, 0] = 1.0
-    S[13, 1] = 1.0
-    S[24, 2] = 1.0
-    S[35, 3] = 1.0
-    S[46, 4] = 1.0
-    S[57, 5] = 1.0
-    S[68, 6] = 1.0
+    S[3, 0] = S[13, 1] = S[24, 2] = S[35, 3] = S[46, 4] = S[57, 5] = S[68, 6] = 1.0
     S.ready = True
     return S
 
 
+def _states(*arrays):
+    """The states as rows of samples, shape (N, 7) each; ValueError unless all have shape (N, 7), or all (7,)."""
+    states = [np.asarray(x, dtype=float) for x in arrays]
+    shapes = [x.shape for x in states]
+    if shapes[0][-1:] != (7,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
+        raise ValueError(f"states of shape {shapes}; expected (N, 7) each, or (7,) each for one state")
+    return tuple([x.reshape(-1, 7) for x in states])
+
+
 def _fill(block, result, states, *arguments):
     """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
-    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
-    N = len(states[0])
+    N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
-    return result
-
-
-def _filled_store(q, qd, qdd, out, *constants):
-    N = np.size(q) // 7
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (69, 7, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(69, 7, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
 
 
 def _by_sample(result, q):
@@ -201,16 +201,41 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def base_parameters(standard, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+def elements(
+    *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088,
+    g: float = 9.81
+) -> dict:
+    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    return {
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
+        'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
+        'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
+        'OFFSET4': ('offset', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
+        'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}),
+        'FV6': ('viscous', 'both', {6: 1.0}), 'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}),
+        'Ia7': ('inertia', 'both', {7: 1.0}), 'FV7': ('viscous', 'both', {7: 1.0}), 'FS7': ('coulomb', 'both', {7: 1.0}),
+        'OFFSET7': ('offset', 'both', {7: 1.0}),
+    }
+
+
+ELEMENTS = elements()
+
+
+def base_parameters(
+    standard: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384,
+    D7: float = 0.088, g: float = 9.81
+) -> np.ndarray:
     """X, shape (69,), from the 98 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
-        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5,
-        M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7,
-        XZ7, YY7, YZ7, ZZ7, MX7, MY7, MZ7, M7, Ia7, FV7, FS7, OFFSET7
+        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, _, _, Ia2, FV2,
+        FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4, XY4, XZ4, YY4, YZ4,
+        ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5,
+        OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7,
+        MX7, MY7, MZ7, M7, Ia7, FV7, FS7, OFFSET7
     ) = standard
     ZZ1R = ZZ1 + Ia1 + YY2
     XX2R = XX2 - YY2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
@@ -243,70 +268,115 @@ def base_parameters(standard, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=
     ])
 
 
-def regressor(q, qd, qdd, *, out=None, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
-    """D of Gamma = D X, shape (N, 7, 69); q, qd, qdd of shape (N, 7) or (7,), rad or m and seconds.
+def regressor(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, RL1: float = 0.333, RL3: float = 0.316,
+    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+) -> np.ndarray:
+    """D of Gamma = D X. Shape (N, 7, 69).
 
     A view on one store of shape (69, 7, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
     faults, up to several times the arithmetic for large N.
     """
-    S = _filled_store(q, qd, qdd, out, RL1, RL3, D4, RL5, D7, g)
-    D = S.transpose(2, 1, 0)
+    D = _filled_store(q, qd, qdd, out, RL3, D4, RL5, D7, g).transpose(2, 1, 0)
     return D[0] if np.ndim(q) == 1 else D
 
 
-def observation_matrix(q, qd, qdd, *, out=None, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
+def observation_matrix(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, RL1: float = 0.333, RL3: float = 0.316,
+    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+) -> np.ndarray:
     """W of Y = W X + rho, shape (7*N, 69), Fortran order, rows joint-major: the same store, no copy."""
-    return _filled_store(q, qd, qdd, out, RL1, RL3, D4, RL5, D7, g).reshape(69, -1).T
+    return _filled_store(q, qd, qdd, out, RL3, D4, RL5, D7, g).reshape(69, -1).T
 
 
-def inverse_dynamics(q, qd, qdd, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
-    """Joint torques Gamma, shape (N, 7), of base parameters X, shape (69,)."""
-    GAM = np.empty((7, np.size(q) // 7))
-    states = (q, qd, qdd)
-    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, RL1, RL3, D4, RL5, D7, g), q)
+def _filled_store(q, qd, qdd, out, RL3, D4, RL5, D7, g):
+    """`out`, or a new store, filled."""
+    states = _states(q, qd, qdd)
+    N = len(states[0])
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (69, 7, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(69, 7, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    D = out.view(np.ndarray)
+    _fill(_regressor_block, D, states, RL3, D4, RL5, D7, g)
+    return D
 
 
-def inertia_matrix(q, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
-    """A(q), shape (N, 7, 7), actuators included."""
-    A = np.empty((7, 7, np.size(q) // 7))
-    states = (q,)
-    return _by_sample(_fill(_inertia_matrix_block, A, states, X, RL1, RL3, D4, RL5, D7, g), q)
+def inverse_dynamics(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316,
+    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+) -> np.ndarray:
+    """Joint torques Gamma. Shape (N, 7)."""
+    states = _states(q, qd, qdd)
+    GAM = np.zeros((7, len(states[0])))
+    _fill(_inverse_dynamics_block, GAM, states, X, RL3, D4, RL5, D7, g)
+    return _by_sample(GAM, q)
 
 
-def bias(q, qd, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
-    """Gamma at qdd = 0, shape (N, 7): Coriolis, centrifugal, gravity, friction and offset."""
-    GAM = np.empty((7, np.size(q) // 7))
-    states = (q, qd)
-    return _by_sample(_fill(_bias_block, GAM, states, X, RL1, RL3, D4, RL5, D7, g), q)
+def inertia_matrix(
+    q: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384,
+    D7: float = 0.088, g: float = 9.81
+) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 7, 7)."""
+    states = _states(q)
+    A = np.zeros((7, 7, len(states[0])))
+    _fill(_inertia_matrix_block, A, states, X, RL3, D4, RL5, D7)
+    return _by_sample(A, q)
 
 
-def gravity(q, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
-    """Gamma at rest without friction, shape (N, 7): gravity, offset and springs (a base parameter may mix them)."""
-    GAM = np.empty((7, np.size(q) // 7))
-    states = (q,)
-    return _by_sample(_fill(_gravity_block, GAM, states, X, RL1, RL3, D4, RL5, D7, g), q)
+def bias(
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825,
+    RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+) -> np.ndarray:
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 7)."""
+    states = _states(q, qd)
+    GAM = np.zeros((7, len(states[0])))
+    _fill(_bias_block, GAM, states, X, RL3, D4, RL5, D7, g)
+    return _by_sample(GAM, q)
 
 
-def forward_dynamics(q, qd, tau, X, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
-    """qdd = A(q)**-1 (tau - bias), shape (N, 7)."""
-    A, H = inertia_matrix(q, X, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g), bias(q, qd, X, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g)
+def gravity(
+    q: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384,
+    D7: float = 0.088, g: float = 9.81
+) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 7)."""
+    states = _states(q)
+    GAM = np.zeros((7, len(states[0])))
+    _fill(_gravity_block, GAM, states, X, g)
+    return _by_sample(GAM, q)
+
+
+def frame_poses(
+    q: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088,
+    g: float = 9.81
+) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 7, 4, 4)."""
+    states = _states(q)
+    T = np.zeros((7, 4, 4, len(states[0])))
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = T[6, 3, 3] = 1.0
+    _fill(_frame_poses_block, T, states, RL1, RL3, D4, RL5, D7)
+    return _by_sample(T, q)
+
+
+def forward_dynamics(
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316,
+    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+) -> np.ndarray:
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 7)."""
+    A, H = inertia_matrix(q, X, RL3=RL3, D4=D4, RL5=RL5, D7=D7), bias(q, qd, X, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g)
     return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
-    """Homogeneous transform of every frame j in frame 0, shape (N, 7, 4, 4), at index j - 1."""
-    T = np.zeros((7, 4, 4, np.size(q) // 7))
-    T[:, 3, 3] = 1.0
-    states = (q,)
-    return _by_sample(_fill(_frame_poses_block, T, states, RL1, RL3, D4, RL5, D7, g), q)
-
-
-def jacobian(q, *, frame=7, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088, g=9.81):
-    """J, shape (N, 6, 7): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g).reshape(-1, 7, 4, 4)
+def jacobian(
+    q: np.ndarray, *, frame: int | None = None, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825,
+    RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+) -> np.ndarray:
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 7)."""
+    T = frame_poses(q, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7).reshape(-1, 7, 4, 4)
     J = np.zeros((len(T), 6, 7))
-    P = T[:, (7 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[7 if frame is None else frame]:
+    last = 7 if frame is None else frame
+    P = T[:, last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -315,8 +385,20 @@ def jacobian(q, *, frame=7, RL1=0.333, RL3=0.316, D4=0.0825, RL5=0.384, D7=0.088
     return J[0] if np.ndim(q) == 1 else J
 
 
-def _regressor_block(q, qd, qdd, D, RL1, RL3, D4, RL5, D7, g):
-    """Fill D, shape (69, 7, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (7, N)."""
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
+        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)),),
+        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),)),),
+        7: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),)), (7, 0, ((6, 1.0),)),),
+    }
+
+
+def _regressor_block(q, qd, qdd, D, RL3, D4, RL5, D7, g):
+    """Fill D, shape (69, 7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -342,12 +424,12 @@ def _regressor_block(q, qd, qdd, D, RL1, RL3, D4, RL5, D7, g):
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
-    U232 = S2*QDP1
-    U132 = -C2*QDP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV232 = QP2*W22
-    WP12 = DV232 - U232
+    WP12 = DV232 - S2QDP1
     DV132 = QP2*W12
-    WP22 = U132 - DV132
+    WP22 = -C2QDP1 - DV132
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -661,8 +743,8 @@ def _regressor_block(q, qd, qdd, D, RL1, RL3, D4, RL5, D7, g):
     # Joint 2
     D[4, 1] = -DV122                                                  # DG2XX2
     D[5, 1] = DW122                                                   # DG2XY2
-    D[6, 1] = -U232                                                   # DG2XZ2
-    D[7, 1] = U132                                                    # DG2YZ2
+    D[6, 1] = -S2QDP1                                                 # DG2XZ2
+    D[7, 1] = -C2QDP1                                                 # DG2YZ2
     D[8, 1] = QDP2                                                    # DG2ZZ2
     D[9, 1] = VP22                                                    # DG2MX2
     D[10, 1] = -VP12                                                  # DG2MY2
@@ -830,8 +912,8 @@ def _regressor_block(q, qd, qdd, D, RL1, RL3, D4, RL5, D7, g):
     D[67, 6] = np.sign(QP7)  # DG7FS7
 
 
-def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL1, RL3, D4, RL5, D7, g):
-    """Fill GAM, shape (7, N). q, qd, qdd: (7, N)."""
+def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL3, D4, RL5, D7, g):
+    """Fill GAM, shape (7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -1112,8 +1194,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL1, RL3, D4, RL5, D7, g):
     GAM[6] = OFFSET7 + N37 + Ia7*QDP7 + FV7*QP7 + FS7*np.sign(QP7)
 
 
-def _inertia_matrix_block(q, A, X, RL1, RL3, D4, RL5, D7, g):
-    """Fill A, shape (7, 7, N): column i is Gamma for a unit acceleration of joint i from rest. q: (7, N)."""
+def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
+    """Fill A, shape (7, 7, N), where it is not constant, from q (7, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -1562,8 +1644,8 @@ def _inertia_matrix_block(q, A, X, RL1, RL3, D4, RL5, D7, g):
     A[6, 6] = ZZ7 + Ia7
 
 
-def _bias_block(q, qd, GAM, X, RL1, RL3, D4, RL5, D7, g):
-    """Fill GAM, shape (7, N), for qdd = 0. q, qd: (7, N)."""
+def _bias_block(q, qd, GAM, X, RL3, D4, RL5, D7, g):
+    """Fill GAM, shape (7, N), where it is not constant, from q (7, N); qd (7, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -1887,8 +1969,8 @@ def _bias_block(q, qd, GAM, X, RL1, RL3, D4, RL5, D7, g):
     GAM[6] = OFFSET7 + N37 + FV7*QP7 + FS7*np.sign(QP7)
 
 
-def _gravity_block(q, GAM, X, RL1, RL3, D4, RL5, D7, g):
-    """Fill GAM, shape (7, N), at rest. q: (7, N)."""
+def _gravity_block(q, GAM, X, g):
+    """Fill GAM, shape (7, N), where it is not constant, from q (7, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -1993,8 +2075,8 @@ def _gravity_block(q, GAM, X, RL1, RL3, D4, RL5, D7, g):
     GAM[6] = OFFSET7 + N37
 
 
-def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7, g):
-    """Fill T, shape (7, 4, 4, N). q: (7, N)."""
+def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7):
+    """Fill T, shape (7, 4, 4, N), where it is not constant, from q (7, N)."""
     # Inputs
     q1, q2, q3, q4, q5, q6, q7 = q
     # Trigonometry
@@ -2067,15 +2149,8 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7, g):
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 0, 2] = 0.0
     T[0, 1, 0] = S1
     T[0, 1, 1] = C1
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
     T[0, 2, 3] = RL1
     T[1, 0, 0] = R112
     T[1, 0, 1] = R122
@@ -2085,67 +2160,64 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7, g):
     T[1, 1, 2] = C1
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[1, 2, 2] = 0.0
-    T[1, 0, 3] = 0.0
-    T[1, 1, 3] = 0.0
     T[1, 2, 3] = RL1
     T[2, 0, 0] = R113
     T[2, 0, 1] = R123
     T[2, 0, 2] = -R122
+    T[2, 0, 3] = P13
     T[2, 1, 0] = R213
     T[2, 1, 1] = R223
     T[2, 1, 2] = -R222
+    T[2, 1, 3] = P23
     T[2, 2, 0] = R313
     T[2, 2, 1] = R323
     T[2, 2, 2] = C2
-    T[2, 0, 3] = P13
-    T[2, 1, 3] = P23
     T[2, 2, 3] = P33
     T[3, 0, 0] = R114
     T[3, 0, 1] = R124
     T[3, 0, 2] = -R123
+    T[3, 0, 3] = P14
     T[3, 1, 0] = R214
     T[3, 1, 1] = R224
     T[3, 1, 2] = -R223
+    T[3, 1, 3] = P24
     T[3, 2, 0] = R314
     T[3, 2, 1] = R324
     T[3, 2, 2] = -R323
-    T[3, 0, 3] = P14
-    T[3, 1, 3] = P24
     T[3, 2, 3] = P34
     T[4, 0, 0] = R115
     T[4, 0, 1] = R125
     T[4, 0, 2] = R124
+    T[4, 0, 3] = P15
     T[4, 1, 0] = R215
     T[4, 1, 1] = R225
     T[4, 1, 2] = R224
+    T[4, 1, 3] = P25
     T[4, 2, 0] = R315
     T[4, 2, 1] = R325
     T[4, 2, 2] = R324
-    T[4, 0, 3] = P15
-    T[4, 1, 3] = P25
     T[4, 2, 3] = P35
     T[5, 0, 0] = R116
     T[5, 0, 1] = R126
     T[5, 0, 2] = -R125
+    T[5, 0, 3] = P15
     T[5, 1, 0] = R216
     T[5, 1, 1] = R226
     T[5, 1, 2] = -R225
+    T[5, 1, 3] = P25
     T[5, 2, 0] = R316
     T[5, 2, 1] = R326
     T[5, 2, 2] = -R325
-    T[5, 0, 3] = P15
-    T[5, 1, 3] = P25
     T[5, 2, 3] = P35
     T[6, 0, 0] = R117
     T[6, 0, 1] = R127
     T[6, 0, 2] = -R126
+    T[6, 0, 3] = P17
     T[6, 1, 0] = R217
     T[6, 1, 1] = R227
     T[6, 1, 2] = -R226
+    T[6, 1, 3] = P27
     T[6, 2, 0] = R317
     T[6, 2, 1] = R327
     T[6, 2, 2] = -R326
-    T[6, 0, 3] = P17
-    T[6, 1, 3] = P27
     T[6, 2, 3] = P37

@@ -1,6 +1,6 @@
 """Planar arm, 2 revolute joints, vertical plane: base parameters, regressor, dynamics.
 
-GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.1.0. Do not edit; symgen generate planar_2r
+GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.2.0. Do not edit; symgen generate planar_2r
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta  r
@@ -20,6 +20,26 @@ Base parameters, 13 of 28; Gautier and Khalil (1990), exact over F_p
     as they are: MY1 FV1 FS1 OFFSET1 ZZ2 MX2 MY2 Ia2 FV2 FS2 OFFSET2
 No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    th   joint angle with its constant, rad
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    P    origin of a frame in frame 0
+
 Cost per sample
     regressor         16 multiplications, 10 additions, 2 sin, 2 cos
     inverse_dynamics  28 multiplications, 22 additions, 2 sin, 2 cos
@@ -27,6 +47,9 @@ Cost per sample
     bias              22 multiplications, 15 additions, 2 sin, 2 cos
     gravity           10 multiplications, 7 additions, 2 sin, 2 cos
     frame_poses       2 multiplications, 1 additions, 2 sin, 2 cos
+
+Arguments   q, qd, qdd, tau of shape (N, 2), or (2,) for one state: results then have no axis of samples; rad or m and seconds
+            X of shape (13,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
 import numpy as np
@@ -67,12 +90,6 @@ VALUES = {
     'FS2': 0.4, 'OFFSET2': -0.05,
 }
 LINKS = (1, 2)
-ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
-    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}),
-}
-_PATHS = {1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)))}
 
 
 class Store(np.ndarray):
@@ -84,32 +101,29 @@ class Store(np.ndarray):
         self.ready = False
 
 
-def store(N):
+def store(N: int) -> Store:
     """Room for N samples, shape (13, 2, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
     S = np.zeros((13, 2, N)).view(Store)
-    S[5, 0] = 1.0
-    S[12, 1] = 1.0
+    S[5, 0] = S[12, 1] = 1.0
     S.ready = True
     return S
 
 
+def _states(*arrays):
+    """The states as rows of samples, shape (N, 2) each; ValueError unless all have shape (N, 2), or all (2,)."""
+    states = [np.asarray(x, dtype=float) for x in arrays]
+    shapes = [x.shape for x in states]
+    if shapes[0][-1:] != (2,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
+        raise ValueError(f"states of shape {shapes}; expected (N, 2) each, or (2,) each for one state")
+    return tuple([x.reshape(-1, 2) for x in states])
+
+
 def _fill(block, result, states, *arguments):
     """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
-    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
-    N = len(states[0])
+    N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
-    return result
-
-
-def _filled_store(q, qd, qdd, out, *constants):
-    N = np.size(q) // 2
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (13, 2, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(13, 2, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
 
 
 def _by_sample(result, q):
@@ -118,13 +132,25 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def base_parameters(standard, *, D2=0.5, g=9.81):
+def elements(*, D2: float = 0.5, g: float = 9.81) -> dict:
+    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    return {
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}),
+    }
+
+
+ELEMENTS = elements()
+
+
+def base_parameters(standard: np.ndarray, *, D2: float = 0.5, g: float = 9.81) -> np.ndarray:
     """X, shape (13,), from the 28 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, Ia2, FV2, FS2, OFFSET2
+        _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2, MY2, _, M2, Ia2, FV2, FS2,
+        OFFSET2
     ) = standard
     ZZ1R = ZZ1 + Ia1 + D2**2*M2
     MX1R = MX1 + D2*M2
@@ -133,70 +159,96 @@ def base_parameters(standard, *, D2=0.5, g=9.81):
     ])
 
 
-def regressor(q, qd, qdd, *, out=None, D2=0.5, g=9.81):
-    """D of Gamma = D X, shape (N, 2, 13); q, qd, qdd of shape (N, 2) or (2,), rad or m and seconds.
+def regressor(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.5, g: float = 9.81
+) -> np.ndarray:
+    """D of Gamma = D X. Shape (N, 2, 13).
 
     A view on one store of shape (13, 2, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
     faults, up to several times the arithmetic for large N.
     """
-    S = _filled_store(q, qd, qdd, out, D2, g)
-    D = S.transpose(2, 1, 0)
+    D = _filled_store(q, qd, qdd, out, D2, g).transpose(2, 1, 0)
     return D[0] if np.ndim(q) == 1 else D
 
 
-def observation_matrix(q, qd, qdd, *, out=None, D2=0.5, g=9.81):
+def observation_matrix(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.5, g: float = 9.81
+) -> np.ndarray:
     """W of Y = W X + rho, shape (2*N, 13), Fortran order, rows joint-major: the same store, no copy."""
     return _filled_store(q, qd, qdd, out, D2, g).reshape(13, -1).T
 
 
-def inverse_dynamics(q, qd, qdd, X, *, D2=0.5, g=9.81):
-    """Joint torques Gamma, shape (N, 2), of base parameters X, shape (13,)."""
-    GAM = np.empty((2, np.size(q) // 2))
-    states = (q, qd, qdd)
-    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D2, g), q)
+def _filled_store(q, qd, qdd, out, D2, g):
+    """`out`, or a new store, filled."""
+    states = _states(q, qd, qdd)
+    N = len(states[0])
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (13, 2, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(13, 2, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    D = out.view(np.ndarray)
+    _fill(_regressor_block, D, states, D2, g)
+    return D
 
 
-def inertia_matrix(q, X, *, D2=0.5, g=9.81):
-    """A(q), shape (N, 2, 2), actuators included."""
-    A = np.empty((2, 2, np.size(q) // 2))
-    states = (q,)
-    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D2, g), q)
+def inverse_dynamics(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.5, g: float = 9.81
+) -> np.ndarray:
+    """Joint torques Gamma. Shape (N, 2)."""
+    states = _states(q, qd, qdd)
+    GAM = np.zeros((2, len(states[0])))
+    _fill(_inverse_dynamics_block, GAM, states, X, D2, g)
+    return _by_sample(GAM, q)
 
 
-def bias(q, qd, X, *, D2=0.5, g=9.81):
-    """Gamma at qdd = 0, shape (N, 2): Coriolis, centrifugal, gravity, friction and offset."""
-    GAM = np.empty((2, np.size(q) // 2))
-    states = (q, qd)
-    return _by_sample(_fill(_bias_block, GAM, states, X, D2, g), q)
+def inertia_matrix(q: np.ndarray, X: np.ndarray, *, D2: float = 0.5, g: float = 9.81) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 2, 2)."""
+    states = _states(q)
+    A = np.zeros((2, 2, len(states[0])))
+    _fill(_inertia_matrix_block, A, states, X, D2)
+    return _by_sample(A, q)
 
 
-def gravity(q, X, *, D2=0.5, g=9.81):
-    """Gamma at rest without friction, shape (N, 2): gravity, offset and springs (a base parameter may mix them)."""
-    GAM = np.empty((2, np.size(q) // 2))
-    states = (q,)
-    return _by_sample(_fill(_gravity_block, GAM, states, X, D2, g), q)
+def bias(q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.5, g: float = 9.81) -> np.ndarray:
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 2)."""
+    states = _states(q, qd)
+    GAM = np.zeros((2, len(states[0])))
+    _fill(_bias_block, GAM, states, X, D2, g)
+    return _by_sample(GAM, q)
 
 
-def forward_dynamics(q, qd, tau, X, *, D2=0.5, g=9.81):
-    """qdd = A(q)**-1 (tau - bias), shape (N, 2)."""
-    A, H = inertia_matrix(q, X, D2=D2, g=g), bias(q, qd, X, D2=D2, g=g)
+def gravity(q: np.ndarray, X: np.ndarray, *, D2: float = 0.5, g: float = 9.81) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 2)."""
+    states = _states(q)
+    GAM = np.zeros((2, len(states[0])))
+    _fill(_gravity_block, GAM, states, X, g)
+    return _by_sample(GAM, q)
+
+
+def frame_poses(q: np.ndarray, *, D2: float = 0.5, g: float = 9.81) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 2, 4, 4)."""
+    states = _states(q)
+    T = np.zeros((2, 4, 4, len(states[0])))
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = 1.0
+    _fill(_frame_poses_block, T, states, D2)
+    return _by_sample(T, q)
+
+
+def forward_dynamics(
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.5, g: float = 9.81
+) -> np.ndarray:
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 2)."""
+    A, H = inertia_matrix(q, X, D2=D2), bias(q, qd, X, D2=D2, g=g)
     return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, D2=0.5, g=9.81):
-    """Homogeneous transform of every frame j in frame 0, shape (N, 2, 4, 4), at index j - 1."""
-    T = np.zeros((2, 4, 4, np.size(q) // 2))
-    T[:, 3, 3] = 1.0
-    states = (q,)
-    return _by_sample(_fill(_frame_poses_block, T, states, D2, g), q)
-
-
-def jacobian(q, *, frame=2, D2=0.5, g=9.81):
-    """J, shape (N, 6, 2): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, D2=D2, g=g).reshape(-1, 2, 4, 4)
+def jacobian(q: np.ndarray, *, frame: int | None = None, D2: float = 0.5, g: float = 9.81) -> np.ndarray:
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 2)."""
+    T = frame_poses(q, D2=D2).reshape(-1, 2, 4, 4)
     J = np.zeros((len(T), 6, 2))
-    P = T[:, (2 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[2 if frame is None else frame]:
+    last = 2 if frame is None else frame
+    P = T[:, last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -205,8 +257,15 @@ def jacobian(q, *, frame=2, D2=0.5, g=9.81):
     return J[0] if np.ndim(q) == 1 else J
 
 
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
+    }
+
+
 def _regressor_block(q, qd, qdd, D, D2, g):
-    """Fill D, shape (13, 2, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (2, N)."""
+    """Fill D, shape (13, 2, N), where it is not constant, from q (2, N); qd (2, N); qdd (2, N)."""
     # Inputs
     q1, q2 = q
     QP1, QP2 = qd
@@ -250,7 +309,7 @@ def _regressor_block(q, qd, qdd, D, D2, g):
 
 
 def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, g):
-    """Fill GAM, shape (2, N). q, qd, qdd: (2, N)."""
+    """Fill GAM, shape (2, N), where it is not constant, from q (2, N); qd (2, N); qdd (2, N)."""
     # Inputs
     q1, q2 = q
     QP1, QP2 = qd
@@ -286,8 +345,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, g):
     GAM[1] = OFFSET2 + N32 + Ia2*QDP2 + FV2*QP2 + FS2*np.sign(QP2)
 
 
-def _inertia_matrix_block(q, A, X, D2, g):
-    """Fill A, shape (2, 2, N): column i is Gamma for a unit acceleration of joint i from rest. q: (2, N)."""
+def _inertia_matrix_block(q, A, X, D2):
+    """Fill A, shape (2, 2, N), where it is not constant, from q (2, N)."""
     # Inputs
     q2 = q[1]
     ZZ1R = X[0]
@@ -313,7 +372,7 @@ def _inertia_matrix_block(q, A, X, D2, g):
 
 
 def _bias_block(q, qd, GAM, X, D2, g):
-    """Fill GAM, shape (2, N), for qdd = 0. q, qd: (2, N)."""
+    """Fill GAM, shape (2, N), where it is not constant, from q (2, N); qd (2, N)."""
     # Inputs
     q1, q2 = q
     QP1, QP2 = qd
@@ -355,8 +414,8 @@ def _bias_block(q, qd, GAM, X, D2, g):
     GAM[1] = OFFSET2 + N32 + FV2*QP2 + FS2*np.sign(QP2)
 
 
-def _gravity_block(q, GAM, X, D2, g):
-    """Fill GAM, shape (2, N), at rest. q: (2, N)."""
+def _gravity_block(q, GAM, X, g):
+    """Fill GAM, shape (2, N), where it is not constant, from q (2, N)."""
     # Inputs
     q1, q2 = q
     MX1R = X[1]
@@ -386,8 +445,8 @@ def _gravity_block(q, GAM, X, D2, g):
     GAM[1] = OFFSET2 + N32
 
 
-def _frame_poses_block(q, T, D2, g):
-    """Fill T, shape (2, 4, 4, N). q: (2, N)."""
+def _frame_poses_block(q, T, D2):
+    """Fill T, shape (2, 4, 4, N), where it is not constant, from q (2, N)."""
     # Inputs
     q1, q2 = q
     # Trigonometry
@@ -402,25 +461,11 @@ def _frame_poses_block(q, T, D2, g):
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 0, 2] = 0.0
     T[0, 1, 0] = S1
     T[0, 1, 1] = C1
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
-    T[0, 2, 3] = 0.0
     T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
-    T[1, 0, 2] = 0.0
+    T[1, 0, 3] = P12
     T[1, 1, 0] = S12
     T[1, 1, 1] = C12
-    T[1, 1, 2] = 0.0
-    T[1, 2, 0] = 0.0
-    T[1, 2, 1] = 0.0
-    T[1, 2, 2] = 1.0
-    T[1, 0, 3] = P12
     T[1, 1, 3] = P22
-    T[1, 2, 3] = 0.0

@@ -1,6 +1,6 @@
 """Unimation PUMA 560, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from puma560.yaml, sha256 01eccfddc5c5, by symgen 0.1.0. Do not edit; symgen generate puma560
+GENERATED from puma560.yaml, sha256 01eccfddc5c5, by symgen 0.2.0. Do not edit; symgen generate puma560
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta    r
@@ -41,6 +41,32 @@ Base parameters, 58 of 84; Gautier and Khalil (1990), exact over F_p
         OFFSET4 XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5 OFFSET5 XY6 XZ6 YZ6 ZZ6 MX6 MY6 Ia6 FV6 FS6 OFFSET6
 No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    th   joint angle with its constant, rad
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    DW   differences of their squares
+    U    skew(WP) + skew(W)**2
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    Z    axis of a joint, in the frame of a later link
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    VS   the same, in the antecedent's frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    E    force transmitted to a link by its antecedent, in its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    R    orientation of a frame in frame 0
+    P    origin of a frame in frame 0
+
 Cost per sample
     regressor         395 multiplications, 295 additions, 6 sin, 6 cos
     inverse_dynamics  283 multiplications, 276 additions, 6 sin, 6 cos
@@ -48,6 +74,9 @@ Cost per sample
     bias              265 multiplications, 239 additions, 6 sin, 6 cos
     gravity           50 multiplications, 34 additions, 5 sin, 5 cos
     frame_poses       55 multiplications, 27 additions, 6 sin, 6 cos
+
+Arguments   q, qd, qdd, tau of shape (N, 6), or (6,) for one state: results then have no axis of samples; rad or m and seconds
+            X of shape (58,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
 import numpy as np
@@ -111,23 +140,6 @@ DRIVES = None
 LIMITS = {}
 VALUES = {}
 LINKS = (1, 2, 3, 4, 5, 6)
-ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
-    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
-    'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
-    'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
-    'OFFSET4': ('offset', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
-    'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}),
-    'FV6': ('viscous', 'both', {6: 1.0}), 'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}),
-}
-_PATHS = {
-    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
-    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),))),
-    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
-    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),))),
-    6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),))),
-}
 
 
 class Store(np.ndarray):
@@ -139,36 +151,29 @@ class Store(np.ndarray):
         self.ready = False
 
 
-def store(N):
+def store(N: int) -> Store:
     """Room for N samples, shape (58, 6, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
     S = np.zeros((58, 6, N)).view(Store)
-    S[3, 0] = 1.0
-    S[13, 1] = 1.0
-    S[24, 2] = 1.0
-    S[35, 3] = 1.0
-    S[46, 4] = 1.0
-    S[57, 5] = 1.0
+    S[3, 0] = S[13, 1] = S[24, 2] = S[35, 3] = S[46, 4] = S[57, 5] = 1.0
     S.ready = True
     return S
 
 
+def _states(*arrays):
+    """The states as rows of samples, shape (N, 6) each; ValueError unless all have shape (N, 6), or all (6,)."""
+    states = [np.asarray(x, dtype=float) for x in arrays]
+    shapes = [x.shape for x in states]
+    if shapes[0][-1:] != (6,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
+        raise ValueError(f"states of shape {shapes}; expected (N, 6) each, or (6,) each for one state")
+    return tuple([x.reshape(-1, 6) for x in states])
+
+
 def _fill(block, result, states, *arguments):
     """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
-    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
-    N = len(states[0])
+    N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
-    return result
-
-
-def _filled_store(q, qd, qdd, out, *constants):
-    N = np.size(q) // 6
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (58, 6, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(58, 6, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
 
 
 def _by_sample(result, q):
@@ -177,15 +182,38 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def base_parameters(standard, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
+def elements(
+    *, RL2: float = 0.2435, D3: float = 0.4318, RL3: float = -0.0934, D4: float = -0.0203, RL4: float = 0.4331,
+    g: float = 9.81
+) -> dict:
+    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    return {
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
+        'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
+        'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
+        'OFFSET4': ('offset', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
+        'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}),
+        'FV6': ('viscous', 'both', {6: 1.0}), 'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}),
+    }
+
+
+ELEMENTS = elements()
+
+
+def base_parameters(
+    standard: np.ndarray, *, RL2: float = 0.2435, D3: float = 0.4318, RL3: float = -0.0934, D4: float = -0.0203,
+    RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
     """X, shape (58,), from the 84 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
-        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5,
-        M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6
+        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, MZ2, M2, Ia2,
+        FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4, XY4, XZ4, YY4,
+        YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5,
+        FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6
     ) = standard
     ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + 2*RL2*MZ2 + RL2**2*M2 + (2*RL2 + 2*RL3)*MZ3 + (D3**2 + RL2**2 + 2*RL2*RL3 + RL3**2)*M3 + (D3**2 + D4**2 + RL2**2 + 2*RL2*RL3 + RL3**2)*(M4 + M5 + M6)
     XX2R = XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)
@@ -211,70 +239,115 @@ def base_parameters(standard, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203,
     ])
 
 
-def regressor(q, qd, qdd, *, out=None, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
-    """D of Gamma = D X, shape (N, 6, 58); q, qd, qdd of shape (N, 6) or (6,), rad or m and seconds.
+def regressor(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, RL2: float = 0.2435,
+    D3: float = 0.4318, RL3: float = -0.0934, D4: float = -0.0203, RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
+    """D of Gamma = D X. Shape (N, 6, 58).
 
     A view on one store of shape (58, 6, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
     faults, up to several times the arithmetic for large N.
     """
-    S = _filled_store(q, qd, qdd, out, RL2, D3, RL3, D4, RL4, g)
-    D = S.transpose(2, 1, 0)
+    D = _filled_store(q, qd, qdd, out, RL2, D3, RL3, D4, RL4, g).transpose(2, 1, 0)
     return D[0] if np.ndim(q) == 1 else D
 
 
-def observation_matrix(q, qd, qdd, *, out=None, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
+def observation_matrix(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, RL2: float = 0.2435,
+    D3: float = 0.4318, RL3: float = -0.0934, D4: float = -0.0203, RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
     """W of Y = W X + rho, shape (6*N, 58), Fortran order, rows joint-major: the same store, no copy."""
     return _filled_store(q, qd, qdd, out, RL2, D3, RL3, D4, RL4, g).reshape(58, -1).T
 
 
-def inverse_dynamics(q, qd, qdd, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
-    """Joint torques Gamma, shape (N, 6), of base parameters X, shape (58,)."""
-    GAM = np.empty((6, np.size(q) // 6))
-    states = (q, qd, qdd)
-    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, RL2, D3, RL3, D4, RL4, g), q)
+def _filled_store(q, qd, qdd, out, RL2, D3, RL3, D4, RL4, g):
+    """`out`, or a new store, filled."""
+    states = _states(q, qd, qdd)
+    N = len(states[0])
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (58, 6, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(58, 6, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    D = out.view(np.ndarray)
+    _fill(_regressor_block, D, states, RL2, D3, RL3, D4, RL4, g)
+    return D
 
 
-def inertia_matrix(q, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
-    """A(q), shape (N, 6, 6), actuators included."""
-    A = np.empty((6, 6, np.size(q) // 6))
-    states = (q,)
-    return _by_sample(_fill(_inertia_matrix_block, A, states, X, RL2, D3, RL3, D4, RL4, g), q)
+def inverse_dynamics(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, RL2: float = 0.2435, D3: float = 0.4318,
+    RL3: float = -0.0934, D4: float = -0.0203, RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
+    """Joint torques Gamma. Shape (N, 6)."""
+    states = _states(q, qd, qdd)
+    GAM = np.zeros((6, len(states[0])))
+    _fill(_inverse_dynamics_block, GAM, states, X, RL2, D3, RL3, D4, RL4, g)
+    return _by_sample(GAM, q)
 
 
-def bias(q, qd, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
-    """Gamma at qdd = 0, shape (N, 6): Coriolis, centrifugal, gravity, friction and offset."""
-    GAM = np.empty((6, np.size(q) // 6))
-    states = (q, qd)
-    return _by_sample(_fill(_bias_block, GAM, states, X, RL2, D3, RL3, D4, RL4, g), q)
+def inertia_matrix(
+    q: np.ndarray, X: np.ndarray, *, RL2: float = 0.2435, D3: float = 0.4318, RL3: float = -0.0934, D4: float = -0.0203,
+    RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 6, 6)."""
+    states = _states(q)
+    A = np.zeros((6, 6, len(states[0])))
+    _fill(_inertia_matrix_block, A, states, X, RL2, D3, RL3, D4, RL4)
+    return _by_sample(A, q)
 
 
-def gravity(q, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
-    """Gamma at rest without friction, shape (N, 6): gravity, offset and springs (a base parameter may mix them)."""
-    GAM = np.empty((6, np.size(q) // 6))
-    states = (q,)
-    return _by_sample(_fill(_gravity_block, GAM, states, X, RL2, D3, RL3, D4, RL4, g), q)
+def bias(
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, RL2: float = 0.2435, D3: float = 0.4318, RL3: float = -0.0934,
+    D4: float = -0.0203, RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 6)."""
+    states = _states(q, qd)
+    GAM = np.zeros((6, len(states[0])))
+    _fill(_bias_block, GAM, states, X, RL2, D3, RL3, D4, RL4, g)
+    return _by_sample(GAM, q)
 
 
-def forward_dynamics(q, qd, tau, X, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
-    """qdd = A(q)**-1 (tau - bias), shape (N, 6)."""
-    A, H = inertia_matrix(q, X, RL2=RL2, D3=D3, RL3=RL3, D4=D4, RL4=RL4, g=g), bias(q, qd, X, RL2=RL2, D3=D3, RL3=RL3, D4=D4, RL4=RL4, g=g)
+def gravity(
+    q: np.ndarray, X: np.ndarray, *, RL2: float = 0.2435, D3: float = 0.4318, RL3: float = -0.0934, D4: float = -0.0203,
+    RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 6)."""
+    states = _states(q)
+    GAM = np.zeros((6, len(states[0])))
+    _fill(_gravity_block, GAM, states, X, g)
+    return _by_sample(GAM, q)
+
+
+def frame_poses(
+    q: np.ndarray, *, RL2: float = 0.2435, D3: float = 0.4318, RL3: float = -0.0934, D4: float = -0.0203,
+    RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 6, 4, 4)."""
+    states = _states(q)
+    T = np.zeros((6, 4, 4, len(states[0])))
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
+    _fill(_frame_poses_block, T, states, RL2, D3, RL3, D4, RL4)
+    return _by_sample(T, q)
+
+
+def forward_dynamics(
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, RL2: float = 0.2435, D3: float = 0.4318,
+    RL3: float = -0.0934, D4: float = -0.0203, RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 6)."""
+    A, H = inertia_matrix(q, X, RL2=RL2, D3=D3, RL3=RL3, D4=D4, RL4=RL4), bias(q, qd, X, RL2=RL2, D3=D3, RL3=RL3, D4=D4, RL4=RL4, g=g)
     return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
-    """Homogeneous transform of every frame j in frame 0, shape (N, 6, 4, 4), at index j - 1."""
-    T = np.zeros((6, 4, 4, np.size(q) // 6))
-    T[:, 3, 3] = 1.0
-    states = (q,)
-    return _by_sample(_fill(_frame_poses_block, T, states, RL2, D3, RL3, D4, RL4, g), q)
-
-
-def jacobian(q, *, frame=6, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=0.4331, g=9.81):
-    """J, shape (N, 6, 6): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, RL2=RL2, D3=D3, RL3=RL3, D4=D4, RL4=RL4, g=g).reshape(-1, 6, 4, 4)
+def jacobian(
+    q: np.ndarray, *, frame: int | None = None, RL2: float = 0.2435, D3: float = 0.4318, RL3: float = -0.0934,
+    D4: float = -0.0203, RL4: float = 0.4331, g: float = 9.81
+) -> np.ndarray:
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 6)."""
+    T = frame_poses(q, RL2=RL2, D3=D3, RL3=RL3, D4=D4, RL4=RL4).reshape(-1, 6, 4, 4)
     J = np.zeros((len(T), 6, 6))
-    P = T[:, (6 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[6 if frame is None else frame]:
+    last = 6 if frame is None else frame
+    P = T[:, last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -283,8 +356,19 @@ def jacobian(q, *, frame=6, RL2=0.2435, D3=0.4318, RL3=-0.0934, D4=-0.0203, RL4=
     return J[0] if np.ndim(q) == 1 else J
 
 
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
+        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)),),
+        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),)),),
+    }
+
+
 def _regressor_block(q, qd, qdd, D, RL2, D3, RL3, D4, RL4, g):
-    """Fill D, shape (58, 6, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (6, N)."""
+    """Fill D, shape (58, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -312,12 +396,12 @@ def _regressor_block(q, qd, qdd, D, RL2, D3, RL3, D4, RL4, g):
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
-    U232 = S2*QDP1
-    U132 = -C2*QDP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV232 = QP2*W22
-    WP12 = DV232 - U232
+    WP12 = DV232 - S2QDP1
     DV132 = QP2*W12
-    WP22 = U132 - DV132
+    WP22 = -C2QDP1 - DV132
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -340,12 +424,12 @@ def _regressor_block(q, qd, qdd, D, RL2, D3, RL3, D4, RL4, g):
     WP33 = QDP2 + QDP3
     W13 = -S23*QP1
     W23 = -C23*QP1
-    U233 = S23*QDP1
-    U133 = -C23*QDP1
+    S23QDP1 = S23*QDP1
+    C23QDP1 = C23*QDP1
     DV233 = W33*W23
-    WP13 = DV233 - U233
+    WP13 = DV233 - S23QDP1
     DV133 = W33*W13
-    WP23 = U133 - DV133
+    WP23 = -C23QDP1 - DV133
     DV113 = W13**2
     DV123 = W13*W23
     DV223 = W23**2
@@ -359,8 +443,8 @@ def _regressor_block(q, qd, qdd, D, RL2, D3, RL3, D4, RL4, g):
     U223 = -DV113 - DV333
     U313 = DV133 - WP23
     U323 = DV233 + WP13
-    VSP13 = VP12 + D3*U112 + RL3*U132
-    VSP23 = VP22 + D3*U212 + RL3*U232
+    VSP13 = VP12 + D3*U112 - RL3*C2QDP1
+    VSP23 = VP22 + D3*U212 + RL3*S2QDP1
     VSP33 = VSP22 + D3*U312 - RL3*DV331
     VP13 = C3*VSP13 + S3*VSP23
     VP23 = C3*VSP23 - S3*VSP13
@@ -563,8 +647,8 @@ def _regressor_block(q, qd, qdd, D, RL2, D3, RL3, D4, RL4, g):
     # Joint 2
     D[4, 1] = -DV122                                       # DG2XX2
     D[5, 1] = DW122                                        # DG2XY2
-    D[6, 1] = -U232                                        # DG2XZ2
-    D[7, 1] = U132                                         # DG2YZ2
+    D[6, 1] = -S2QDP1                                      # DG2XZ2
+    D[7, 1] = -C2QDP1                                      # DG2YZ2
     D[8, 1] = QDP2                                         # DG2ZZ2
     D[9, 1] = VP22                                         # DG2MX2
     D[10, 1] = -VP12                                       # DG2MY2
@@ -572,8 +656,8 @@ def _regressor_block(q, qd, qdd, D, RL2, D3, RL3, D4, RL4, g):
     D[12, 1] = np.sign(QP2)                                # DG2FS2
     D[14, 1] = -DV123                                      # DG2XX3
     D[15, 1] = DW123                                       # DG2XY3
-    D[16, 1] = -U233                                       # DG2XZ3
-    D[17, 1] = U133                                        # DG2YZ3
+    D[16, 1] = -S23QDP1                                    # DG2XZ3
+    D[17, 1] = -C23QDP1                                    # DG2YZ3
     D[18, 1] = WP33                                        # DG2ZZ3
     D[19, 1] = VP23 + U113*V132 + U213*V232                # DG2MX3
     D[20, 1] = U123*V132 + U223*V232 - VP13                # DG2MY3
@@ -601,8 +685,8 @@ def _regressor_block(q, qd, qdd, D, RL2, D3, RL3, D4, RL4, g):
     # Joint 3
     D[14, 2] = -DV123                                      # DG3XX3
     D[15, 2] = DW123                                       # DG3XY3
-    D[16, 2] = -U233                                       # DG3XZ3
-    D[17, 2] = U133                                        # DG3YZ3
+    D[16, 2] = -S23QDP1                                    # DG3XZ3
+    D[17, 2] = -C23QDP1                                    # DG3YZ3
     D[18, 2] = WP33                                        # DG3ZZ3
     D[19, 2] = VP23                                        # DG3MX3
     D[20, 2] = -VP13                                       # DG3MY3
@@ -687,7 +771,7 @@ def _regressor_block(q, qd, qdd, D, RL2, D3, RL3, D4, RL4, g):
 
 
 def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL2, D3, RL3, D4, RL4, g):
-    """Fill GAM, shape (6, N). q, qd, qdd: (6, N)."""
+    """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -932,8 +1016,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL2, D3, RL3, D4, RL4, g):
     GAM[5] = OFFSET6 + N36 + Ia6*QDP6 + FV6*QP6 + FS6*np.sign(QP6)
 
 
-def _inertia_matrix_block(q, A, X, RL2, D3, RL3, D4, RL4, g):
-    """Fill A, shape (6, 6, N): column i is Gamma for a unit acceleration of joint i from rest. q: (6, N)."""
+def _inertia_matrix_block(q, A, X, RL2, D3, RL3, D4, RL4):
+    """Fill A, shape (6, 6, N), where it is not constant, from q (6, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -1101,12 +1185,12 @@ def _inertia_matrix_block(q, A, X, RL2, D3, RL3, D4, RL4, g):
     F162 = MY6*WP252
     F262 = -MX6*WP252
     F362 = MY6*WP162 - MX6*WP262
-    XX6RWP162pXZ6WP252pXY6WP262 = XX6R*WP162 + XY6*WP262 - XZ6*WP252
-    XY6WP162pYZ6WP252 = XY6*WP162 - YZ6*WP252
-    ZZ6WP252pYZ6WP262pXZ6WP162 = YZ6*WP262 + XZ6*WP162 - ZZ6*WP252
-    N162 = XX6RWP162pXZ6WP252pXY6WP262 - MY6*VP252
-    N262 = XY6WP162pYZ6WP252 + MX6*VP252
-    N362 = ZZ6WP252pYZ6WP262pXZ6WP162 + MX6*VP262 - MY6*VP162
+    XX6RWP162pXY6WP262mXZ6WP252 = XX6R*WP162 + XY6*WP262 - XZ6*WP252
+    XY6WP162mYZ6WP252 = XY6*WP162 - YZ6*WP252
+    YZ6WP262pXZ6WP162mZZ6WP252 = YZ6*WP262 + XZ6*WP162 - ZZ6*WP252
+    N162 = XX6RWP162pXY6WP262mXZ6WP252 - MY6*VP252
+    N262 = XY6WP162mYZ6WP252 + MX6*VP252
+    N362 = YZ6WP262pXZ6WP162mZZ6WP252 + MX6*VP262 - MY6*VP162
     FDI162 = C6*F162 - S6*F262
     FDI362 = S6*F162 + C6*F262
     # Joint 5
@@ -1116,12 +1200,12 @@ def _inertia_matrix_block(q, A, X, RL2, D3, RL3, D4, RL4, g):
     E152 = FDI162 + F152
     E252 = F252 - F362
     E352 = FDI362 + F352
-    XX5RWP152pXZ5C4mXY5WP252 = XX5R*WP152 + XZ5*C4 + XY5*WP252
+    XX5RWP152pXZ5C4pXY5WP252 = XX5R*WP152 + XZ5*C4 + XY5*WP252
     XY5WP152pYZ5C4 = XY5*WP152 + YZ5*C4
-    ZZ5RC4mYZ5WP252pXZ5WP152 = ZZ5R*C4 + YZ5*WP252 + XZ5*WP152
-    N152 = XX5RWP152pXZ5C4mXY5WP252 + MY5R*VP242
+    ZZ5RC4pYZ5WP252pXZ5WP152 = ZZ5R*C4 + YZ5*WP252 + XZ5*WP152
+    N152 = XX5RWP152pXZ5C4pXY5WP252 + MY5R*VP242
     N252 = XY5WP152pYZ5C4 - MX5*VP242
-    N352 = ZZ5RC4mYZ5WP252pXZ5WP152 + MX5*VP252 - MY5R*VP152
+    N352 = ZZ5RC4pYZ5WP252pXZ5WP152 + MX5*VP252 - MY5R*VP152
     NE152 = C6*N162 + N152 - S6*N262
     NE252 = N252 - N362
     NE352 = S6*N162 + C6*N262 + N352
@@ -1140,12 +1224,12 @@ def _inertia_matrix_block(q, A, X, RL2, D3, RL3, D4, RL4, g):
     NE242 = NE352 + N242
     NE342 = N342 - S5*NE152 - C5*NE252
     FDI142 = C4*FDI152 - S4*E352
-    D4E342pRL4FDI142 = D4*E342 - RL4*FDI142
+    D4E342mRL4FDI142 = D4*E342 - RL4*FDI142
     # Joint 3
     E132 = FDI142 - MY3R
     E232 = MX3R - E342
     N332 = ZZ3R + MX3R*VP232 - MY3R*VP132
-    NE332 = S4*NE142 + C4*NE242 + N332 - D4E342pRL4FDI142
+    NE332 = S4*NE142 + C4*NE242 + N332 - D4E342mRL4FDI142
     FDI232 = S3*E132 + C3*E232
     # Joint 2
     NE322 = ZZ2R + NE332 + D3*FDI232
@@ -1159,13 +1243,13 @@ def _inertia_matrix_block(q, A, X, RL2, D3, RL3, D4, RL4, g):
     VP163 = C6*VP153 + S6*VP243
     VP263 = C6*VP243 - S6*VP153
     # Joint 6
-    N163 = XX6RWP162pXZ6WP252pXY6WP262 - MY6*VP253
-    N263 = XY6WP162pYZ6WP252 + MX6*VP253
-    N363 = ZZ6WP252pYZ6WP262pXZ6WP162 + MX6*VP263 - MY6*VP163
+    N163 = XX6RWP162pXY6WP262mXZ6WP252 - MY6*VP253
+    N263 = XY6WP162mYZ6WP252 + MX6*VP253
+    N363 = YZ6WP262pXZ6WP162mZZ6WP252 + MX6*VP263 - MY6*VP163
     # Joint 5
-    N153 = XX5RWP152pXZ5C4mXY5WP252 + MY5R*VP243
+    N153 = XX5RWP152pXZ5C4pXY5WP252 + MY5R*VP243
     N253 = XY5WP152pYZ5C4 - MX5*VP243
-    N353 = ZZ5RC4mYZ5WP252pXZ5WP152 + MX5*VP253 - MY5R*VP153
+    N353 = ZZ5RC4pYZ5WP252pXZ5WP152 + MX5*VP253 - MY5R*VP153
     NE153 = C6*N163 + N153 - S6*N263
     NE253 = N253 - N363
     NE353 = S6*N163 + C6*N263 + N353
@@ -1177,7 +1261,7 @@ def _inertia_matrix_block(q, A, X, RL2, D3, RL3, D4, RL4, g):
     NE243 = NE353 + N243
     NE343 = N343 - S5*NE153 - C5*NE253
     # Joint 3
-    NE333 = ZZ3R + S4*NE143 + C4*NE243 - D4E342pRL4FDI142
+    NE333 = ZZ3R + S4*NE143 + C4*NE243 - D4E342mRL4FDI142
     # Link 6
     WP164 = -S5*C6
     WP264 = S5*S6
@@ -1225,7 +1309,7 @@ def _inertia_matrix_block(q, A, X, RL2, D3, RL3, D4, RL4, g):
 
 
 def _bias_block(q, qd, GAM, X, RL2, D3, RL3, D4, RL4, g):
-    """Fill GAM, shape (6, N), for qdd = 0. q, qd: (6, N)."""
+    """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -1498,8 +1582,8 @@ def _bias_block(q, qd, GAM, X, RL2, D3, RL3, D4, RL4, g):
     GAM[5] = OFFSET6 + N36 + FV6*QP6 + FS6*np.sign(QP6)
 
 
-def _gravity_block(q, GAM, X, RL2, D3, RL3, D4, RL4, g):
-    """Fill GAM, shape (6, N), at rest. q: (6, N)."""
+def _gravity_block(q, GAM, X, g):
+    """Fill GAM, shape (6, N), where it is not constant, from q (6, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -1585,8 +1669,8 @@ def _gravity_block(q, GAM, X, RL2, D3, RL3, D4, RL4, g):
     GAM[5] = OFFSET6 + N36
 
 
-def _frame_poses_block(q, T, RL2, D3, RL3, D4, RL4, g):
-    """Fill T, shape (6, 4, 4, N). q: (6, N)."""
+def _frame_poses_block(q, T, RL2, D3, RL3, D4, RL4):
+    """Fill T, shape (6, 4, 4, N), where it is not constant, from q (6, N)."""
     # Inputs
     q1, q2, q3, q4, q5, q6 = q
     # Trigonometry
@@ -1645,73 +1729,62 @@ def _frame_poses_block(q, T, RL2, D3, RL3, D4, RL4, g):
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 0, 2] = 0.0
     T[0, 1, 0] = S1
     T[0, 1, 1] = C1
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
-    T[0, 2, 3] = 0.0
     T[1, 0, 0] = R112
     T[1, 0, 1] = R122
     T[1, 0, 2] = -S1
+    T[1, 0, 3] = P12
     T[1, 1, 0] = R212
     T[1, 1, 1] = R222
     T[1, 1, 2] = C1
+    T[1, 1, 3] = P22
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[1, 2, 2] = 0.0
-    T[1, 0, 3] = P12
-    T[1, 1, 3] = P22
-    T[1, 2, 3] = 0.0
     T[2, 0, 0] = R113
     T[2, 0, 1] = R123
     T[2, 0, 2] = -S1
+    T[2, 0, 3] = P13
     T[2, 1, 0] = R213
     T[2, 1, 1] = R223
     T[2, 1, 2] = C1
+    T[2, 1, 3] = P23
     T[2, 2, 0] = -S23
     T[2, 2, 1] = -C23
-    T[2, 2, 2] = 0.0
-    T[2, 0, 3] = P13
-    T[2, 1, 3] = P23
     T[2, 2, 3] = P33
     T[3, 0, 0] = R114
     T[3, 0, 1] = R124
     T[3, 0, 2] = -R123
+    T[3, 0, 3] = P14
     T[3, 1, 0] = R214
     T[3, 1, 1] = R224
     T[3, 1, 2] = -R223
+    T[3, 1, 3] = P24
     T[3, 2, 0] = R314
     T[3, 2, 1] = R324
     T[3, 2, 2] = C23
-    T[3, 0, 3] = P14
-    T[3, 1, 3] = P24
     T[3, 2, 3] = P34
     T[4, 0, 0] = R115
     T[4, 0, 1] = R125
     T[4, 0, 2] = R124
+    T[4, 0, 3] = P14
     T[4, 1, 0] = R215
     T[4, 1, 1] = R225
     T[4, 1, 2] = R224
+    T[4, 1, 3] = P24
     T[4, 2, 0] = R315
     T[4, 2, 1] = R325
     T[4, 2, 2] = R324
-    T[4, 0, 3] = P14
-    T[4, 1, 3] = P24
     T[4, 2, 3] = P34
     T[5, 0, 0] = R116
     T[5, 0, 1] = R126
     T[5, 0, 2] = -R125
+    T[5, 0, 3] = P14
     T[5, 1, 0] = R216
     T[5, 1, 1] = R226
     T[5, 1, 2] = -R225
+    T[5, 1, 3] = P24
     T[5, 2, 0] = R316
     T[5, 2, 1] = R326
     T[5, 2, 2] = -R325
-    T[5, 0, 3] = P14
-    T[5, 1, 3] = P24
     T[5, 2, 3] = P34

@@ -1,6 +1,6 @@
 """SCARA with joints RRRP: base parameters, regressor, dynamics.
 
-GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.1.0. Do not edit; symgen generate scara
+GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.2.0. Do not edit; symgen generate scara
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta   r
@@ -28,6 +28,28 @@ Base parameters, 22 of 56; Gautier and Khalil (1990), exact over F_p
     as they are: FV1 FS1 OFFSET1 MY2 Ia2 FV2 FS2 OFFSET2 Ia3 FV3 FS3 OFFSET3 FV4 FS4
 No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 XX4 XY4 XZ4 YY4 YZ4 MZ4
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    th   joint angle with its constant, rad
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    VS   the same, in the antecedent's frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    E    force transmitted to a link by its antecedent, in its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    P    origin of a frame in frame 0
+
 Cost per sample
     regressor         39 multiplications, 28 additions, 2 sin, 2 cos
     inverse_dynamics  51 multiplications, 44 additions, 2 sin, 2 cos
@@ -35,6 +57,9 @@ Cost per sample
     bias              38 multiplications, 29 additions, 2 sin, 2 cos
     gravity           1 multiplications, 1 additions, 0 sin, 0 cos
     frame_poses       4 multiplications, 4 additions, 3 sin, 3 cos
+
+Arguments   q, qd, qdd, tau of shape (N, 4), or (4,) for one state: results then have no axis of samples; rad or m and seconds
+            X of shape (22,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
 import numpy as np
@@ -79,19 +104,6 @@ DRIVES = None
 LIMITS = {}
 VALUES = {}
 LINKS = (1, 2, 3, 4)
-ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
-    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
-    'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
-    'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
-    'OFFSET4': ('offset', 'both', {4: 1.0}),
-}
-_PATHS = {
-    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
-    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),))),
-    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 1, ((3, 1.0),))),
-}
 
 
 class Store(np.ndarray):
@@ -103,34 +115,29 @@ class Store(np.ndarray):
         self.ready = False
 
 
-def store(N):
+def store(N: int) -> Store:
     """Room for N samples, shape (22, 4, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
     S = np.zeros((22, 4, N)).view(Store)
-    S[3, 0] = 1.0
-    S[10, 1] = 1.0
-    S[17, 2] = 1.0
-    S[21, 3] = 1.0
+    S[3, 0] = S[10, 1] = S[17, 2] = S[21, 3] = 1.0
     S.ready = True
     return S
 
 
+def _states(*arrays):
+    """The states as rows of samples, shape (N, 4) each; ValueError unless all have shape (N, 4), or all (4,)."""
+    states = [np.asarray(x, dtype=float) for x in arrays]
+    shapes = [x.shape for x in states]
+    if shapes[0][-1:] != (4,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
+        raise ValueError(f"states of shape {shapes}; expected (N, 4) each, or (4,) each for one state")
+    return tuple([x.reshape(-1, 4) for x in states])
+
+
 def _fill(block, result, states, *arguments):
     """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
-    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
-    N = len(states[0])
+    N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
-    return result
-
-
-def _filled_store(q, qd, qdd, out, *constants):
-    N = np.size(q) // 4
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (22, 4, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(22, 4, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
 
 
 def _by_sample(result, q):
@@ -139,14 +146,29 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def base_parameters(standard, *, D2=0.425, D3=0.375, g=9.81):
+def elements(*, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> dict:
+    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    return {
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
+        'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
+        'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
+        'OFFSET4': ('offset', 'both', {4: 1.0}),
+    }
+
+
+ELEMENTS = elements()
+
+
+def base_parameters(standard: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
     """X, shape (22,), from the 56 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
-        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4
+        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2, MY2, _, M2, Ia2, FV2, FS2,
+        OFFSET2, _, _, _, _, _, ZZ3, MX3, MY3, _, M3, Ia3, FV3, FS3, OFFSET3, _, _, _, _, _, ZZ4, MX4, MY4, _, M4, Ia4,
+        FV4, FS4, OFFSET4
     ) = standard
     ZZ1R = ZZ1 + Ia1 + D2**2*(M2 + M3 - Ia4)
     ZZ2R = ZZ2 + D3**2*(M3 - Ia4)
@@ -162,70 +184,100 @@ def base_parameters(standard, *, D2=0.425, D3=0.375, g=9.81):
     ])
 
 
-def regressor(q, qd, qdd, *, out=None, D2=0.425, D3=0.375, g=9.81):
-    """D of Gamma = D X, shape (N, 4, 22); q, qd, qdd of shape (N, 4) or (4,), rad or m and seconds.
+def regressor(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.425, D3: float = 0.375,
+    g: float = 9.81
+) -> np.ndarray:
+    """D of Gamma = D X. Shape (N, 4, 22).
 
     A view on one store of shape (22, 4, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
     faults, up to several times the arithmetic for large N.
     """
-    S = _filled_store(q, qd, qdd, out, D2, D3, g)
-    D = S.transpose(2, 1, 0)
+    D = _filled_store(q, qd, qdd, out, D2, D3, g).transpose(2, 1, 0)
     return D[0] if np.ndim(q) == 1 else D
 
 
-def observation_matrix(q, qd, qdd, *, out=None, D2=0.425, D3=0.375, g=9.81):
+def observation_matrix(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.425, D3: float = 0.375,
+    g: float = 9.81
+) -> np.ndarray:
     """W of Y = W X + rho, shape (4*N, 22), Fortran order, rows joint-major: the same store, no copy."""
     return _filled_store(q, qd, qdd, out, D2, D3, g).reshape(22, -1).T
 
 
-def inverse_dynamics(q, qd, qdd, X, *, D2=0.425, D3=0.375, g=9.81):
-    """Joint torques Gamma, shape (N, 4), of base parameters X, shape (22,)."""
-    GAM = np.empty((4, np.size(q) // 4))
-    states = (q, qd, qdd)
-    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D2, D3, g), q)
+def _filled_store(q, qd, qdd, out, D2, D3, g):
+    """`out`, or a new store, filled."""
+    states = _states(q, qd, qdd)
+    N = len(states[0])
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (22, 4, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(22, 4, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    D = out.view(np.ndarray)
+    _fill(_regressor_block, D, states, D2, D3, g)
+    return D
 
 
-def inertia_matrix(q, X, *, D2=0.425, D3=0.375, g=9.81):
-    """A(q), shape (N, 4, 4), actuators included."""
-    A = np.empty((4, 4, np.size(q) // 4))
-    states = (q,)
-    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D2, D3, g), q)
+def inverse_dynamics(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375,
+    g: float = 9.81
+) -> np.ndarray:
+    """Joint torques Gamma. Shape (N, 4)."""
+    states = _states(q, qd, qdd)
+    GAM = np.zeros((4, len(states[0])))
+    _fill(_inverse_dynamics_block, GAM, states, X, D2, D3, g)
+    return _by_sample(GAM, q)
 
 
-def bias(q, qd, X, *, D2=0.425, D3=0.375, g=9.81):
-    """Gamma at qdd = 0, shape (N, 4): Coriolis, centrifugal, gravity, friction and offset."""
-    GAM = np.empty((4, np.size(q) // 4))
-    states = (q, qd)
-    return _by_sample(_fill(_bias_block, GAM, states, X, D2, D3, g), q)
+def inertia_matrix(q: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 4, 4)."""
+    states = _states(q)
+    A = np.zeros((4, 4, len(states[0])))
+    _fill(_inertia_matrix_block, A, states, X, D2, D3)
+    return _by_sample(A, q)
 
 
-def gravity(q, X, *, D2=0.425, D3=0.375, g=9.81):
-    """Gamma at rest without friction, shape (N, 4): gravity, offset and springs (a base parameter may mix them)."""
-    GAM = np.empty((4, np.size(q) // 4))
-    states = (q,)
-    return _by_sample(_fill(_gravity_block, GAM, states, X, D2, D3, g), q)
+def bias(q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 4)."""
+    states = _states(q, qd)
+    GAM = np.zeros((4, len(states[0])))
+    _fill(_bias_block, GAM, states, X, D2, D3, g)
+    return _by_sample(GAM, q)
 
 
-def forward_dynamics(q, qd, tau, X, *, D2=0.425, D3=0.375, g=9.81):
-    """qdd = A(q)**-1 (tau - bias), shape (N, 4)."""
-    A, H = inertia_matrix(q, X, D2=D2, D3=D3, g=g), bias(q, qd, X, D2=D2, D3=D3, g=g)
+def gravity(q: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 4)."""
+    states = _states(q)
+    GAM = np.zeros((4, len(states[0])))
+    _fill(_gravity_block, GAM, (), X, g)
+    return _by_sample(GAM, q)
+
+
+def frame_poses(q: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 4, 4, 4)."""
+    states = _states(q)
+    T = np.zeros((4, 4, 4, len(states[0])))
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = T[3, 3, 3] = 1.0
+    _fill(_frame_poses_block, T, states, D2, D3)
+    return _by_sample(T, q)
+
+
+def forward_dynamics(
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375,
+    g: float = 9.81
+) -> np.ndarray:
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 4)."""
+    A, H = inertia_matrix(q, X, D2=D2, D3=D3), bias(q, qd, X, D2=D2, D3=D3, g=g)
     return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, D2=0.425, D3=0.375, g=9.81):
-    """Homogeneous transform of every frame j in frame 0, shape (N, 4, 4, 4), at index j - 1."""
-    T = np.zeros((4, 4, 4, np.size(q) // 4))
-    T[:, 3, 3] = 1.0
-    states = (q,)
-    return _by_sample(_fill(_frame_poses_block, T, states, D2, D3, g), q)
-
-
-def jacobian(q, *, frame=4, D2=0.425, D3=0.375, g=9.81):
-    """J, shape (N, 6, 4): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, D2=D2, D3=D3, g=g).reshape(-1, 4, 4, 4)
+def jacobian(q: np.ndarray, *, frame: int | None = None, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 4)."""
+    T = frame_poses(q, D2=D2, D3=D3).reshape(-1, 4, 4, 4)
     J = np.zeros((len(T), 6, 4))
-    P = T[:, (4 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[4 if frame is None else frame]:
+    last = 4 if frame is None else frame
+    P = T[:, last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -234,8 +286,17 @@ def jacobian(q, *, frame=4, D2=0.425, D3=0.375, g=9.81):
     return J[0] if np.ndim(q) == 1 else J
 
 
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
+        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 1, ((3, 1.0),)),),
+    }
+
+
 def _regressor_block(q, qd, qdd, D, D2, D3, g):
-    """Fill D, shape (22, 4, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (4, N)."""
+    """Fill D, shape (22, 4, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -311,7 +372,7 @@ def _regressor_block(q, qd, qdd, D, D2, D3, g):
 
 
 def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, g):
-    """Fill GAM, shape (4, N). q, qd, qdd: (4, N)."""
+    """Fill GAM, shape (4, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -376,8 +437,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, g):
     GAM[3] = OFFSET4R + F34 + FV4*QP4 + FS4*np.sign(QP4)
 
 
-def _inertia_matrix_block(q, A, X, D2, D3, g):
-    """Fill A, shape (4, 4, N): column i is Gamma for a unit acceleration of joint i from rest. q: (4, N)."""
+def _inertia_matrix_block(q, A, X, D2, D3):
+    """Fill A, shape (4, 4, N), where it is not constant, from q (4, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -437,17 +498,14 @@ def _inertia_matrix_block(q, A, X, D2, D3, g):
     A[0, 0] = NE311
     A[1, 0] = A[0, 1] = NE321
     A[2, 0] = A[0, 2] = N331
-    A[3, 0] = A[0, 3] = 0.0
     A[1, 1] = Ia2 + NE322
     A[2, 1] = A[1, 2] = N332
-    A[3, 1] = A[1, 3] = 0.0
     A[2, 2] = ZZ3R + Ia3
-    A[3, 2] = A[2, 3] = 0.0
     A[3, 3] = M4R
 
 
 def _bias_block(q, qd, GAM, X, D2, D3, g):
-    """Fill GAM, shape (4, N), for qdd = 0. q, qd: (4, N)."""
+    """Fill GAM, shape (4, N), where it is not constant, from q (4, N); qd (4, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -470,7 +528,7 @@ def _bias_block(q, qd, GAM, X, D2, D3, g):
     FS4 = X[20]
     OFFSET4R = X[21]
     # Constants
-    F34 = M4R*g
+    F34 = g*M4R
     # Trigonometry
     C2 = np.cos(q2)
     S2 = np.sin(q2)
@@ -517,8 +575,8 @@ def _bias_block(q, qd, GAM, X, D2, D3, g):
     GAM[3] = OFFSET4R + F34 + FV4*QP4 + FS4*np.sign(QP4)
 
 
-def _gravity_block(q, GAM, X, D2, D3, g):
-    """Fill GAM, shape (4, N), at rest. q: (4, N)."""
+def _gravity_block(GAM, X, g):
+    """Fill GAM, shape (4, N), where it is not constant."""
     # Inputs
     OFFSET1 = X[3]
     OFFSET2 = X[10]
@@ -526,7 +584,7 @@ def _gravity_block(q, GAM, X, D2, D3, g):
     M4R = X[18]
     OFFSET4R = X[21]
     # Constants
-    F34 = M4R*g
+    F34 = g*M4R
     # Torques
     GAM[0] = OFFSET1
     GAM[1] = OFFSET2
@@ -534,8 +592,8 @@ def _gravity_block(q, GAM, X, D2, D3, g):
     GAM[3] = OFFSET4R + F34
 
 
-def _frame_poses_block(q, T, D2, D3, g):
-    """Fill T, shape (4, 4, 4, N). q: (4, N)."""
+def _frame_poses_block(q, T, D2, D3):
+    """Fill T, shape (4, 4, 4, N), where it is not constant, from q (4, N)."""
     # Inputs
     q1, q2, q3, q4 = q
     # Trigonometry
@@ -556,49 +614,24 @@ def _frame_poses_block(q, T, D2, D3, g):
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 0, 2] = 0.0
     T[0, 1, 0] = S1
     T[0, 1, 1] = C1
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
-    T[0, 2, 3] = 0.0
     T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
-    T[1, 0, 2] = 0.0
+    T[1, 0, 3] = P12
     T[1, 1, 0] = S12
     T[1, 1, 1] = C12
-    T[1, 1, 2] = 0.0
-    T[1, 2, 0] = 0.0
-    T[1, 2, 1] = 0.0
-    T[1, 2, 2] = 1.0
-    T[1, 0, 3] = P12
     T[1, 1, 3] = P22
-    T[1, 2, 3] = 0.0
     T[2, 0, 0] = C123
     T[2, 0, 1] = -S123
-    T[2, 0, 2] = 0.0
+    T[2, 0, 3] = P13
     T[2, 1, 0] = S123
     T[2, 1, 1] = C123
-    T[2, 1, 2] = 0.0
-    T[2, 2, 0] = 0.0
-    T[2, 2, 1] = 0.0
-    T[2, 2, 2] = 1.0
-    T[2, 0, 3] = P13
     T[2, 1, 3] = P23
-    T[2, 2, 3] = 0.0
     T[3, 0, 0] = C123
     T[3, 0, 1] = -S123
-    T[3, 0, 2] = 0.0
+    T[3, 0, 3] = P13
     T[3, 1, 0] = S123
     T[3, 1, 1] = C123
-    T[3, 1, 2] = 0.0
-    T[3, 2, 0] = 0.0
-    T[3, 2, 1] = 0.0
-    T[3, 2, 2] = 1.0
-    T[3, 0, 3] = P13
     T[3, 1, 3] = P23
     T[3, 2, 3] = q4

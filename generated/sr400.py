@@ -1,6 +1,6 @@
 """SR400, 6 actuated joints, one parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.1.0. Do not edit; symgen generate sr400
+GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.2.0. Do not edit; symgen generate sr400
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
      j  ant  mu  sigma  gamma  alpha    d  theta    r
@@ -54,6 +54,32 @@ Base parameters, 60 of 104; Gautier and Khalil (1990), exact over F_p
         OFFSET5 XY6 XZ6 YZ6 ZZ6 MX6 MY6 Ia6 FV6 FS6 OFFSET6 MY7 FV7 FS7 OFFSET7 MY8
 No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 MZ7
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    th   joint angle with its constant, rad
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    DW   differences of their squares
+    U    skew(WP) + skew(W)**2
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    Z    axis of a joint, in the frame of a later link
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    VS   the same, in the antecedent's frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    E    force transmitted to a link by its antecedent, in its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    R    orientation of a frame in frame 0
+    P    origin of a frame in frame 0
+
 Cost per sample
     regressor         392 multiplications, 290 additions, 6 sin, 6 cos
     inverse_dynamics  300 multiplications, 285 additions, 6 sin, 6 cos
@@ -61,6 +87,9 @@ Cost per sample
     bias              283 multiplications, 248 additions, 6 sin, 6 cos
     gravity           57 multiplications, 42 additions, 6 sin, 6 cos
     frame_poses       56 multiplications, 31 additions, 6 sin, 6 cos
+
+Arguments   q, qd, qdd, tau of shape (N, 6), or (6,) for one state: results then have no axis of samples; rad or m and seconds
+            X of shape (60,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
 import numpy as np
@@ -129,27 +158,6 @@ DRIVES = None
 LIMITS = {}
 VALUES = {}
 LINKS = (1, 2, 3, 4, 5, 6, 7, 8)
-ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
-    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia4': ('inertia', 'both', {4: 1.0}),
-    'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}), 'OFFSET4': ('offset', 'both', {4: 1.0}),
-    'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}), 'FS5': ('coulomb', 'both', {5: 1.0}),
-    'OFFSET5': ('offset', 'both', {5: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}), 'FV6': ('viscous', 'both', {6: 1.0}),
-    'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}), 'Ia7': ('inertia', 'both', {7: 1.0}),
-    'FV7': ('viscous', 'both', {7: 1.0}), 'FS7': ('coulomb', 'both', {7: 1.0}), 'OFFSET7': ('offset', 'both', {7: 1.0}),
-}
-_PATHS = {
-    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
-    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0)))),
-    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0))), (4, 0, ((2, 1.0),))),
-    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0))), (4, 0, ((2, 1.0),)), (5, 0, ((3, 1.0),))),
-    6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0))), (4, 0, ((2, 1.0),)), (5, 0, ((3, 1.0),)), (6, 0, ((4, 1.0),))),
-    7: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),))),
-    8: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0)))),
-    9: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0))), (9, 0, ((1, -1.0), (5, 1.0)))),
-    10: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0)))),
-}
 
 
 class Store(np.ndarray):
@@ -161,36 +169,29 @@ class Store(np.ndarray):
         self.ready = False
 
 
-def store(N):
+def store(N: int) -> Store:
     """Room for N samples, shape (60, 6, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
     S = np.zeros((60, 6, N)).view(Store)
-    S[3, 0] = 1.0
-    S[13, 1] = 1.0
-    S[31, 2] = 1.0
-    S[42, 3] = 1.0
-    S[53, 4] = 1.0
-    S[58, 5] = 1.0
+    S[3, 0] = S[13, 1] = S[31, 2] = S[42, 3] = S[53, 4] = S[58, 5] = 1.0
     S.ready = True
     return S
 
 
+def _states(*arrays):
+    """The states as rows of samples, shape (N, 6) each; ValueError unless all have shape (N, 6), or all (6,)."""
+    states = [np.asarray(x, dtype=float) for x in arrays]
+    shapes = [x.shape for x in states]
+    if shapes[0][-1:] != (6,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
+        raise ValueError(f"states of shape {shapes}; expected (N, 6) each, or (6,) each for one state")
+    return tuple([x.reshape(-1, 6) for x in states])
+
+
 def _fill(block, result, states, *arguments):
     """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
-    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
-    N = len(states[0])
+    N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
-    return result
-
-
-def _filled_store(q, qd, qdd, out, *constants):
-    N = np.size(q) // 6
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (60, 6, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(60, 6, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
 
 
 def _by_sample(result, q):
@@ -199,16 +200,38 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def base_parameters(standard, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+def elements(
+    *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> dict:
+    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    return {
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia4': ('inertia', 'both', {4: 1.0}),
+        'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}), 'OFFSET4': ('offset', 'both', {4: 1.0}),
+        'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}), 'FS5': ('coulomb', 'both', {5: 1.0}),
+        'OFFSET5': ('offset', 'both', {5: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}), 'FV6': ('viscous', 'both', {6: 1.0}),
+        'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}), 'Ia7': ('inertia', 'both', {7: 1.0}),
+        'FV7': ('viscous', 'both', {7: 1.0}), 'FS7': ('coulomb', 'both', {7: 1.0}), 'OFFSET7': ('offset', 'both', {7: 1.0}),
+    }
+
+
+ELEMENTS = elements()
+
+
+def base_parameters(
+    standard: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
+    g: float = 9.81
+) -> np.ndarray:
     """X, shape (60,), from the 104 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, XX4, XY4, XZ4, YY4, YZ4, ZZ4,
-        MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5,
-        OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7,
-        MX7, MY7, MZ7, M7, Ia7, FV7, FS7, OFFSET7, XX8, XY8, XZ8, YY8, YZ8, ZZ8, MX8, MY8, MZ8, M8
+        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, _, M2, Ia2, FV2,
+        FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, XX4, XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4,
+        Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6,
+        YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7, MX7, MY7, _, M7, Ia7,
+        FV7, FS7, OFFSET7, XX8, XY8, XZ8, YY8, YZ8, ZZ8, MX8, MY8, MZ8, M8
     ) = standard
     ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 + (D2**2 + D3**2 + D4**2)*(M4 + M5 + M6)
     XX2R = XX2 - YY2 + XX8 - YY8 - D3**2*(M3 + M4 + M5 + M6)
@@ -239,70 +262,116 @@ def base_parameters(standard, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.
     ])
 
 
-def regressor(q, qd, qdd, *, out=None, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
-    """D of Gamma = D X, shape (N, 6, 60); q, qd, qdd of shape (N, 6) or (6,), rad or m and seconds.
+def regressor(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.25, D3: float = 0.6,
+    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> np.ndarray:
+    """D of Gamma = D X. Shape (N, 6, 60).
 
     A view on one store of shape (60, 6, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
     faults, up to several times the arithmetic for large N.
     """
-    S = _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g)
-    D = S.transpose(2, 1, 0)
+    D = _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g).transpose(2, 1, 0)
     return D[0] if np.ndim(q) == 1 else D
 
 
-def observation_matrix(q, qd, qdd, *, out=None, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+def observation_matrix(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.25, D3: float = 0.6,
+    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> np.ndarray:
     """W of Y = W X + rho, shape (6*N, 60), Fortran order, rows joint-major: the same store, no copy."""
     return _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g).reshape(60, -1).T
 
 
-def inverse_dynamics(q, qd, qdd, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
-    """Joint torques Gamma, shape (N, 6), of base parameters X, shape (60,)."""
-    GAM = np.empty((6, np.size(q) // 6))
-    states = (q, qd, qdd)
-    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D2, D3, D4, RL4, D8, g), q)
+def _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g):
+    """`out`, or a new store, filled."""
+    states = _states(q, qd, qdd)
+    N = len(states[0])
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (60, 6, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(60, 6, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    D = out.view(np.ndarray)
+    _fill(_regressor_block, D, states, D2, D3, D4, RL4, D8, g)
+    return D
 
 
-def inertia_matrix(q, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
-    """A(q), shape (N, 6, 6), actuators included."""
-    A = np.empty((6, 6, np.size(q) // 6))
-    states = (q,)
-    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D2, D3, D4, RL4, D8, g), q)
+def inverse_dynamics(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6,
+    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> np.ndarray:
+    """Joint torques Gamma. Shape (N, 6)."""
+    states = _states(q, qd, qdd)
+    GAM = np.zeros((6, len(states[0])))
+    _fill(_inverse_dynamics_block, GAM, states, X, D2, D3, D4, RL4, D8, g)
+    return _by_sample(GAM, q)
 
 
-def bias(q, qd, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
-    """Gamma at qdd = 0, shape (N, 6): Coriolis, centrifugal, gravity, friction and offset."""
-    GAM = np.empty((6, np.size(q) // 6))
-    states = (q, qd)
-    return _by_sample(_fill(_bias_block, GAM, states, X, D2, D3, D4, RL4, D8, g), q)
+def inertia_matrix(
+    q: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
+    D8: float = 0.3, g: float = 9.81
+) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 6, 6)."""
+    states = _states(q)
+    A = np.zeros((6, 6, len(states[0])))
+    _fill(_inertia_matrix_block, A, states, X, D2, D3, D4, RL4, D8)
+    return _by_sample(A, q)
 
 
-def gravity(q, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
-    """Gamma at rest without friction, shape (N, 6): gravity, offset and springs (a base parameter may mix them)."""
-    GAM = np.empty((6, np.size(q) // 6))
-    states = (q,)
-    return _by_sample(_fill(_gravity_block, GAM, states, X, D2, D3, D4, RL4, D8, g), q)
+def bias(
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
+    RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> np.ndarray:
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 6)."""
+    states = _states(q, qd)
+    GAM = np.zeros((6, len(states[0])))
+    _fill(_bias_block, GAM, states, X, D2, D3, D4, RL4, D8, g)
+    return _by_sample(GAM, q)
 
 
-def forward_dynamics(q, qd, tau, X, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
-    """qdd = A(q)**-1 (tau - bias), shape (N, 6)."""
-    A, H = inertia_matrix(q, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g), bias(q, qd, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
+def gravity(
+    q: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
+    D8: float = 0.3, g: float = 9.81
+) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 6)."""
+    states = _states(q)
+    GAM = np.zeros((6, len(states[0])))
+    _fill(_gravity_block, GAM, states, X, g)
+    return _by_sample(GAM, q)
+
+
+def frame_poses(
+    q: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
+    g: float = 9.81
+) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 10, 4, 4)."""
+    states = _states(q)
+    T = np.zeros((10, 4, 4, len(states[0])))
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = T[6, 3, 3] = 1.0
+    T[7, 3, 3] = T[8, 3, 3] = T[9, 3, 3] = 1.0
+    _fill(_frame_poses_block, T, states, D2, D3, D4, RL4, D8)
+    return _by_sample(T, q)
+
+
+def forward_dynamics(
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6,
+    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> np.ndarray:
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 6)."""
+    A, H = inertia_matrix(q, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8), bias(q, qd, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
     return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
-    """Homogeneous transform of every frame j in frame 0, shape (N, 10, 4, 4), at index j - 1."""
-    T = np.zeros((10, 4, 4, np.size(q) // 6))
-    T[:, 3, 3] = 1.0
-    states = (q,)
-    return _by_sample(_fill(_frame_poses_block, T, states, D2, D3, D4, RL4, D8, g), q)
-
-
-def jacobian(q, *, frame=10, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
-    """J, shape (N, 6, 6): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g).reshape(-1, 10, 4, 4)
+def jacobian(
+    q: np.ndarray, *, frame: int | None = None, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
+    D8: float = 0.3, g: float = 9.81
+) -> np.ndarray:
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 6)."""
+    T = frame_poses(q, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8).reshape(-1, 10, 4, 4)
     J = np.zeros((len(T), 6, 6))
-    P = T[:, (10 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[10 if frame is None else frame]:
+    last = 10 if frame is None else frame
+    P = T[:, last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -311,22 +380,43 @@ def jacobian(q, *, frame=10, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
     return J[0] if np.ndim(q) == 1 else J
 
 
-def passive_joints(q, qd=None, qdd=None, *, D2=0.25, D3=0.6, D4=0.15, RL4=0.7, D8=0.3, g=9.81):
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
+        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2, 1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2, 1.0),)), (5, 0, ((3, 1.0),)),),
+        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2, 1.0),)), (5, 0, ((3, 1.0),)), (6, 0, ((4, 1.0),)),),
+        7: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)),),
+        8: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0),)),),
+        9: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0),)), (9, 0, ((1, -1.0), (5, 1.0),)),),
+        10: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)),),
+    }
+
+
+def passive_joints(
+    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *, D2: float = 0.25, D3: float = 0.6,
+    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> np.ndarray | tuple:
     """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also their accelerations."""
-    rates = np.array([
-        [0, -1, 0, 0, 0, 1],
-        [0, 1, 0, 0, 0, -1],
-        [0, -1, 0, 0, 0, 1],
-    ], dtype=float)
-    offsets = np.array([np.pi/2, 0, np.pi], dtype=float)
-    states = [q, qd, qdd]
-    found = [np.asarray(x, dtype=float) @ rates.T for x, given in zip(states, (q, qd, qdd)) if given is not None]
+    rates = np.zeros((3, 6))
+    rates[0, 1] = -1.0
+    rates[0, 5] = 1.0
+    rates[1, 1] = 1.0
+    rates[1, 5] = -1.0
+    rates[2, 1] = -1.0
+    rates[2, 5] = 1.0
+    offsets = np.array([np.pi/2, 0.0, np.pi])
+    given = [x is not None for x in (q, qd, qdd)]
+    states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
+    found = [(x @ rates.T).reshape(*np.shape(q)[:-1], 3) for x, wanted in zip(states, given) if wanted]
     found[0] += offsets
     return found[0] if len(found) == 1 else tuple(found)
 
 
 def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
-    """Fill D, shape (60, 6, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (6, N)."""
+    """Fill D, shape (60, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
     q2 = q[1]
     q4 = q[2]
@@ -354,12 +444,12 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     # Link 2
     W1_2 = -S2*QP1
     W2_2 = -C2*QP1
-    U2_3_2 = S2*QDP1
-    U1_3_2 = -C2*QDP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV2_3_2 = QP2*W2_2
-    WP1_2 = DV2_3_2 - U2_3_2
+    WP1_2 = DV2_3_2 - S2QDP1
     DV1_3_2 = QP2*W1_2
-    WP2_2 = U1_3_2 - DV1_3_2
+    WP2_2 = -C2QDP1 - DV1_3_2
     DV1_1_2 = W1_2**2
     DV1_2_2 = W1_2*W2_2
     DV2_2_2 = W2_2**2
@@ -380,12 +470,12 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     # Link 3
     W1_3 = -C7*QP1
     W2_3 = S7*QP1
-    U2_3_3 = C7*QDP1
-    U1_3_3 = S7*QDP1
+    C7QDP1 = C7*QDP1
+    S7QDP1 = S7*QDP1
     DV2_3_3 = QP7*W2_3
-    WP1_3 = DV2_3_3 - U2_3_3
+    WP1_3 = DV2_3_3 - C7QDP1
     DV1_3_3 = QP7*W1_3
-    WP2_3 = U1_3_3 - DV1_3_3
+    WP2_3 = S7QDP1 - DV1_3_3
     DV1_1_3 = W1_3**2
     DV1_2_3 = W1_3*W2_3
     DV2_2_3 = W2_3**2
@@ -602,8 +692,8 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     # Joint 2
     D[4, 1] = -DV1_2_2                                                # DG2XX2
     D[5, 1] = DW1_2_2                                                 # DG2XY2
-    D[6, 1] = -U2_3_2                                                 # DG2XZ2
-    D[7, 1] = U1_3_2                                                  # DG2YZ2
+    D[6, 1] = -S2QDP1                                                 # DG2XZ2
+    D[7, 1] = -C2QDP1                                                 # DG2YZ2
     D[8, 1] = QDP2                                                    # DG2ZZ2
     D[9, 1] = VP2_2                                                   # DG2MX2
     D[10, 1] = -VP1_2                                                 # DG2MY2
@@ -675,8 +765,8 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     # Joint 7
     D[14, 5] = -DV1_2_3                                        # DG7XX3
     D[15, 5] = DW1_2_3                                         # DG7XY3
-    D[16, 5] = -U2_3_3                                         # DG7XZ3
-    D[17, 5] = U1_3_3                                          # DG7YZ3
+    D[16, 5] = -C7QDP1                                         # DG7XZ3
+    D[17, 5] = S7QDP1                                          # DG7YZ3
     D[18, 5] = QDP7                                            # DG7ZZ3
     D[19, 5] = VP2_3                                           # DG7MX3
     D[20, 5] = -VP1_3                                          # DG7MY3
@@ -709,7 +799,7 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
 
 
 def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
-    """Fill GAM, shape (6, N). q, qd, qdd: (6, N)."""
+    """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
     q2 = q[1]
     q4 = q[2]
@@ -972,8 +1062,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     GAM[5] = NE3_3 + OFFSET7 + NE3_7 + FV7*QP7 + FS7*np.sign(QP7) - N3_8
 
 
-def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8, g):
-    """Fill A, shape (6, 6, N): column i is Gamma for a unit acceleration of joint i from rest. q: (6, N)."""
+def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
+    """Fill A, shape (6, 6, N), where it is not constant, from q (6, N)."""
     # Inputs
     q2 = q[1]
     q4 = q[2]
@@ -1295,7 +1385,7 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8, g):
 
 
 def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
-    """Fill GAM, shape (6, N), for qdd = 0. q, qd: (6, N)."""
+    """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N)."""
     # Inputs
     q2 = q[1]
     q4 = q[2]
@@ -1587,8 +1677,8 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     GAM[5] = NE3_3 + OFFSET7 + NE3_7 + FV7*QP7 + FS7*np.sign(QP7) - N3_8
 
 
-def _gravity_block(q, GAM, X, D2, D3, D4, RL4, D8, g):
-    """Fill GAM, shape (6, N), at rest. q: (6, N)."""
+def _gravity_block(q, GAM, X, g):
+    """Fill GAM, shape (6, N), where it is not constant, from q (6, N)."""
     # Inputs
     q2 = q[1]
     q4 = q[2]
@@ -1690,8 +1780,8 @@ def _gravity_block(q, GAM, X, D2, D3, D4, RL4, D8, g):
     GAM[5] = NE3_3 + OFFSET7 + NE3_7 - N3_8
 
 
-def _frame_poses_block(q, T, D2, D3, D4, RL4, D8, g):
-    """Fill T, shape (10, 4, 4, N). q: (6, N)."""
+def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
+    """Fill T, shape (10, 4, 4, N), where it is not constant, from q (6, N)."""
     # Inputs
     q1, q2, q4, q5, q6, q7 = q
     # Trigonometry
@@ -1764,121 +1854,105 @@ def _frame_poses_block(q, T, D2, D3, D4, RL4, D8, g):
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 0, 2] = 0.0
     T[0, 1, 0] = S1
     T[0, 1, 1] = C1
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
-    T[0, 2, 3] = 0.0
     T[1, 0, 0] = R1_1_2
     T[1, 0, 1] = R1_2_2
     T[1, 0, 2] = -S1
+    T[1, 0, 3] = P1_2
     T[1, 1, 0] = R2_1_2
     T[1, 1, 1] = R2_2_2
     T[1, 1, 2] = C1
+    T[1, 1, 3] = P2_2
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[1, 2, 2] = 0.0
-    T[1, 0, 3] = P1_2
-    T[1, 1, 3] = P2_2
-    T[1, 2, 3] = 0.0
     T[2, 0, 0] = R1_1_3
     T[2, 0, 1] = R1_2_3
     T[2, 0, 2] = -S1
+    T[2, 0, 3] = P1_3
     T[2, 1, 0] = R2_1_3
     T[2, 1, 1] = R2_2_3
     T[2, 1, 2] = C1
+    T[2, 1, 3] = P2_3
     T[2, 2, 0] = -C7
     T[2, 2, 1] = S7
-    T[2, 2, 2] = 0.0
-    T[2, 0, 3] = P1_3
-    T[2, 1, 3] = P2_3
     T[2, 2, 3] = P3_3
     T[3, 0, 0] = R1_1_4
     T[3, 0, 1] = R1_2_4
     T[3, 0, 2] = R1_2_3
+    T[3, 0, 3] = P1_4
     T[3, 1, 0] = R2_1_4
     T[3, 1, 1] = R2_2_4
     T[3, 1, 2] = R2_2_3
+    T[3, 1, 3] = P2_4
     T[3, 2, 0] = R3_1_4
     T[3, 2, 1] = R3_2_4
     T[3, 2, 2] = S7
-    T[3, 0, 3] = P1_4
-    T[3, 1, 3] = P2_4
     T[3, 2, 3] = P3_4
     T[4, 0, 0] = R1_1_5
     T[4, 0, 1] = R1_2_5
     T[4, 0, 2] = -R1_2_4
+    T[4, 0, 3] = P1_4
     T[4, 1, 0] = R2_1_5
     T[4, 1, 1] = R2_2_5
     T[4, 1, 2] = -R2_2_4
+    T[4, 1, 3] = P2_4
     T[4, 2, 0] = R3_1_5
     T[4, 2, 1] = R3_2_5
     T[4, 2, 2] = -R3_2_4
-    T[4, 0, 3] = P1_4
-    T[4, 1, 3] = P2_4
     T[4, 2, 3] = P3_4
     T[5, 0, 0] = R1_1_6
     T[5, 0, 1] = R1_2_6
     T[5, 0, 2] = R1_2_5
+    T[5, 0, 3] = P1_4
     T[5, 1, 0] = R2_1_6
     T[5, 1, 1] = R2_2_6
     T[5, 1, 2] = R2_2_5
+    T[5, 1, 3] = P2_4
     T[5, 2, 0] = R3_1_6
     T[5, 2, 1] = R3_2_6
     T[5, 2, 2] = R3_2_5
-    T[5, 0, 3] = P1_4
-    T[5, 1, 3] = P2_4
     T[5, 2, 3] = P3_4
     T[6, 0, 0] = -R1_2_3
     T[6, 0, 1] = R1_1_3
     T[6, 0, 2] = -S1
+    T[6, 0, 3] = P1_2
     T[6, 1, 0] = -R2_2_3
     T[6, 1, 1] = R2_1_3
     T[6, 1, 2] = C1
+    T[6, 1, 3] = P2_2
     T[6, 2, 0] = -S7
     T[6, 2, 1] = -C7
-    T[6, 2, 2] = 0.0
-    T[6, 0, 3] = P1_2
-    T[6, 1, 3] = P2_2
-    T[6, 2, 3] = 0.0
     T[7, 0, 0] = R1_1_2
     T[7, 0, 1] = R1_2_2
     T[7, 0, 2] = -S1
+    T[7, 0, 3] = P1_8
     T[7, 1, 0] = R2_1_2
     T[7, 1, 1] = R2_2_2
     T[7, 1, 2] = C1
+    T[7, 1, 3] = P2_8
     T[7, 2, 0] = -S2
     T[7, 2, 1] = -C2
-    T[7, 2, 2] = 0.0
-    T[7, 0, 3] = P1_8
-    T[7, 1, 3] = P2_8
     T[7, 2, 3] = P3_8
     T[8, 0, 0] = R1_2_3
     T[8, 0, 1] = -R1_1_3
     T[8, 0, 2] = -S1
+    T[8, 0, 3] = P1_9
     T[8, 1, 0] = R2_2_3
     T[8, 1, 1] = -R2_1_3
     T[8, 1, 2] = C1
+    T[8, 1, 3] = P2_9
     T[8, 2, 0] = S7
     T[8, 2, 1] = C7
-    T[8, 2, 2] = 0.0
-    T[8, 0, 3] = P1_9
-    T[8, 1, 3] = P2_9
     T[8, 2, 3] = P3_9
     T[9, 0, 0] = R1_2_3
     T[9, 0, 1] = -R1_1_3
     T[9, 0, 2] = -S1
+    T[9, 0, 3] = P1_10
     T[9, 1, 0] = R2_2_3
     T[9, 1, 1] = -R2_1_3
     T[9, 1, 2] = C1
+    T[9, 1, 3] = P2_10
     T[9, 2, 0] = S7
     T[9, 2, 1] = C7
-    T[9, 2, 2] = 0.0
-    T[9, 0, 3] = P1_10
-    T[9, 1, 3] = P2_10
     T[9, 2, 3] = P3_9

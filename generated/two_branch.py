@@ -1,6 +1,6 @@
 """Tree of two branches, 7 joints, one of them prismatic, and a fixed tool: base parameters, regressor, dynamics.
 
-GENERATED from two_branch.yaml, sha256 22ecb3e74d7c, by symgen 0.1.0. Do not edit; symgen generate two_branch
+GENERATED from two_branch.yaml, sha256 22ecb3e74d7c, by symgen 0.2.0. Do not edit; symgen generate two_branch
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  gamma   b  alpha   d       theta         r
@@ -52,6 +52,33 @@ Base parameters, 67 of 108; Gautier and Khalil (1990), exact over F_p
         OFFSET6 XY7 XZ7 YZ7 MX7 Ia7 FV7 FS7 OFFSET7 XY8 XZ8 YZ8 ZZ8 MX8 MY8 Ia8 FV8 FS8 OFFSET8
 No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    th   joint angle with its constant, rad
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    r    position of a prismatic joint with its constant, m
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    DW   differences of their squares
+    U    skew(WP) + skew(W)**2
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    Z    axis of a joint, in the frame of a later link
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    VS   the same, in the antecedent's frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    E    force transmitted to a link by its antecedent, in its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    R    orientation of a frame in frame 0
+    P    origin of a frame in frame 0
+
 Cost per sample
     regressor         270 multiplications, 211 additions, 7 sin, 7 cos
     inverse_dynamics  300 multiplications, 293 additions, 7 sin, 7 cos
@@ -59,6 +86,9 @@ Cost per sample
     bias              275 multiplications, 240 additions, 7 sin, 7 cos
     gravity           75 multiplications, 54 additions, 6 sin, 6 cos
     frame_poses       55 multiplications, 28 additions, 6 sin, 6 cos
+
+Arguments   q, qd, qdd, tau of shape (N, 7), or (7,) for one state: results then have no axis of samples; rad or m and seconds
+            X of shape (67,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
 import numpy as np
@@ -133,26 +163,6 @@ DRIVES = None
 LIMITS = {}
 VALUES = {}
 LINKS = (1, 2, 3, 4, 5, 6, 7, 8)
-ELEMENTS = {  # (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)
-    'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-    'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-    'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
-    'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
-    'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
-    'OFFSET4': ('offset', 'both', {4: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}), 'FV6': ('viscous', 'both', {6: 1.0}),
-    'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}), 'Ia7': ('inertia', 'both', {7: 1.0}),
-    'FV7': ('viscous', 'both', {7: 1.0}), 'FS7': ('coulomb', 'both', {7: 1.0}), 'OFFSET7': ('offset', 'both', {7: 1.0}),
-    'Ia8': ('inertia', 'both', {8: 1.0}), 'FV8': ('viscous', 'both', {8: 1.0}), 'FS8': ('coulomb', 'both', {8: 1.0}),
-    'OFFSET8': ('offset', 'both', {8: 1.0}),
-}
-_PATHS = {
-    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
-    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),))),
-    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
-    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
-    6: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),))), 7: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)), (7, 0, ((5, 1.0),))),
-    8: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((6, 1.0),))),
-}
 
 
 class Store(np.ndarray):
@@ -164,37 +174,29 @@ class Store(np.ndarray):
         self.ready = False
 
 
-def store(N):
+def store(N: int) -> Store:
     """Room for N samples, shape (67, 7, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
     S = np.zeros((67, 7, N)).view(Store)
-    S[5, 0] = 1.0
-    S[15, 1] = 1.0
-    S[23, 2] = 1.0
-    S[34, 3] = 1.0
-    S[44, 4] = 1.0
-    S[55, 5] = 1.0
-    S[66, 6] = 1.0
+    S[5, 0] = S[15, 1] = S[23, 2] = S[34, 3] = S[44, 4] = S[55, 5] = S[66, 6] = 1.0
     S.ready = True
     return S
 
 
+def _states(*arrays):
+    """The states as rows of samples, shape (N, 7) each; ValueError unless all have shape (N, 7), or all (7,)."""
+    states = [np.asarray(x, dtype=float) for x in arrays]
+    shapes = [x.shape for x in states]
+    if shapes[0][-1:] != (7,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
+        raise ValueError(f"states of shape {shapes}; expected (N, 7) each, or (7,) each for one state")
+    return tuple([x.reshape(-1, 7) for x in states])
+
+
 def _fill(block, result, states, *arguments):
     """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
-    states = [np.atleast_2d(np.asarray(x, dtype=float)) for x in states]
-    N = len(states[0])
+    N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
-    return result
-
-
-def _filled_store(q, qd, qdd, out, *constants):
-    N = np.size(q) // 7
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (67, 7, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(67, 7, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    return _fill(_regressor_block, out.view(np.ndarray), (q, qd, qdd), *constants)
 
 
 def _by_sample(result, q):
@@ -203,16 +205,41 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def base_parameters(standard, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+def elements(
+    *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4,
+    D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
+) -> dict:
+    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    return {
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
+        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
+        'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
+        'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
+        'OFFSET4': ('offset', 'both', {4: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}), 'FV6': ('viscous', 'both', {6: 1.0}),
+        'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}), 'Ia7': ('inertia', 'both', {7: 1.0}),
+        'FV7': ('viscous', 'both', {7: 1.0}), 'FS7': ('coulomb', 'both', {7: 1.0}), 'OFFSET7': ('offset', 'both', {7: 1.0}),
+        'Ia8': ('inertia', 'both', {8: 1.0}), 'FV8': ('viscous', 'both', {8: 1.0}), 'FS8': ('coulomb', 'both', {8: 1.0}),
+        'OFFSET8': ('offset', 'both', {8: 1.0}),
+    }
+
+
+ELEMENTS = elements()
+
+
+def base_parameters(
+    standard: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11,
+    B6: float = 0.4, D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
+) -> np.ndarray:
     """X, shape (67,), from the 108 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
-        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5,
-        M5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7, MX7,
-        MY7, MZ7, M7, Ia7, FV7, FS7, OFFSET7, XX8, XY8, XZ8, YY8, YZ8, ZZ8, MX8, MY8, MZ8, M8, Ia8, FV8, FS8, OFFSET8
+        _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, MZ2, M2,
+        Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4, XY4, XZ4,
+        YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, XX6,
+        XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7, MX7, MY7, MZ7,
+        M7, Ia7, FV7, FS7, OFFSET7, XX8, XY8, XZ8, YY8, YZ8, ZZ8, MX8, MY8, MZ8, M8, Ia8, FV8, FS8, OFFSET8
     ) = standard
     ZZ1R = ZZ1 + Ia1 + YY2 + ZZ3 + YY4 + ZZ5 + YY6 + YY7 + 2*RL2*MZ2 + (D2**2 + RL2**2)*M2 + D4**2*M4 + 2*D5*MX5 + (D4**2 + D5**2)*M5 + D6**2*M6 + (D6**2 + D7**2)*(M7 + M8)
     MX1R = MX1 - MZ6 - MZ7 + D2*M2
@@ -248,70 +275,124 @@ def base_parameters(standard, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, 
     ])
 
 
-def regressor(q, qd, qdd, *, out=None, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
-    """D of Gamma = D X, shape (N, 7, 67); q, qd, qdd of shape (N, 7) or (7,), rad or m and seconds.
+def regressor(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.21, RL2: float = 0.13,
+    D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23,
+    RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
+) -> np.ndarray:
+    """D of Gamma = D X. Shape (N, 7, 67).
 
     A view on one store of shape (67, 7, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
     faults, up to several times the arithmetic for large N.
     """
-    S = _filled_store(q, qd, qdd, out, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ)
-    D = S.transpose(2, 1, 0)
+    D = _filled_store(q, qd, qdd, out, D2, RL2, D4, D6, D7, RL8, GX, GZ).transpose(2, 1, 0)
     return D[0] if np.ndim(q) == 1 else D
 
 
-def observation_matrix(q, qd, qdd, *, out=None, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
+def observation_matrix(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.21, RL2: float = 0.13,
+    D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23,
+    RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
+) -> np.ndarray:
     """W of Y = W X + rho, shape (7*N, 67), Fortran order, rows joint-major: the same store, no copy."""
-    return _filled_store(q, qd, qdd, out, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ).reshape(67, -1).T
+    return _filled_store(q, qd, qdd, out, D2, RL2, D4, D6, D7, RL8, GX, GZ).reshape(67, -1).T
 
 
-def inverse_dynamics(q, qd, qdd, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
-    """Joint torques Gamma, shape (N, 7), of base parameters X, shape (67,)."""
-    GAM = np.empty((7, np.size(q) // 7))
-    states = (q, qd, qdd)
-    return _by_sample(_fill(_inverse_dynamics_block, GAM, states, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+def _filled_store(q, qd, qdd, out, D2, RL2, D4, D6, D7, RL8, GX, GZ):
+    """`out`, or a new store, filled."""
+    states = _states(q, qd, qdd)
+    N = len(states[0])
+    if out is None:
+        out = store(N)
+    elif not (isinstance(out, Store) and out.ready and out.shape == (67, 7, N)):
+        raise ValueError(f"out: expected store({N}) of shape {(67, 7, N)}, found {type(out).__name__} of shape {np.shape(out)}")
+    D = out.view(np.ndarray)
+    _fill(_regressor_block, D, states, D2, RL2, D4, D6, D7, RL8, GX, GZ)
+    return D
 
 
-def inertia_matrix(q, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
-    """A(q), shape (N, 7, 7), actuators included."""
-    A = np.empty((7, 7, np.size(q) // 7))
-    states = (q,)
-    return _by_sample(_fill(_inertia_matrix_block, A, states, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+def inverse_dynamics(
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13,
+    D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23,
+    RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
+) -> np.ndarray:
+    """Joint torques Gamma. Shape (N, 7)."""
+    states = _states(q, qd, qdd)
+    GAM = np.zeros((7, len(states[0])))
+    _fill(_inverse_dynamics_block, GAM, states, X, D2, RL2, D4, D6, D7, RL8, GX, GZ)
+    return _by_sample(GAM, q)
 
 
-def bias(q, qd, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
-    """Gamma at qdd = 0, shape (N, 7): Coriolis, centrifugal, gravity, friction and offset."""
-    GAM = np.empty((7, np.size(q) // 7))
-    states = (q, qd)
-    return _by_sample(_fill(_bias_block, GAM, states, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+def inertia_matrix(
+    q: np.ndarray, X: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06,
+    RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905,
+    GZ: float = -8.496
+) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 7, 7)."""
+    states = _states(q)
+    A = np.zeros((7, 7, len(states[0])))
+    _fill(_inertia_matrix_block, A, states, X, D2, RL2, D4, D6, D7, RL8)
+    return _by_sample(A, q)
 
 
-def gravity(q, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
-    """Gamma at rest without friction, shape (N, 7): gravity, offset and springs (a base parameter may mix them)."""
-    GAM = np.empty((7, np.size(q) // 7))
-    states = (q,)
-    return _by_sample(_fill(_gravity_block, GAM, states, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
+def bias(
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17,
+    D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29,
+    GX: float = -4.905, GZ: float = -8.496
+) -> np.ndarray:
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 7)."""
+    states = _states(q, qd)
+    GAM = np.zeros((7, len(states[0])))
+    _fill(_bias_block, GAM, states, X, D2, RL2, D4, D6, D7, RL8, GX, GZ)
+    return _by_sample(GAM, q)
 
 
-def forward_dynamics(q, qd, tau, X, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
-    """qdd = A(q)**-1 (tau - bias), shape (N, 7)."""
-    A, H = inertia_matrix(q, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ), bias(q, qd, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ)
+def gravity(
+    q: np.ndarray, X: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06,
+    RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905,
+    GZ: float = -8.496
+) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 7)."""
+    states = _states(q)
+    GAM = np.zeros((7, len(states[0])))
+    _fill(_gravity_block, GAM, states, X, D2, RL2, GX, GZ)
+    return _by_sample(GAM, q)
+
+
+def frame_poses(
+    q: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11,
+    B6: float = 0.4, D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
+) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 8, 4, 4)."""
+    states = _states(q)
+    T = np.zeros((8, 4, 4, len(states[0])))
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = T[6, 3, 3] = 1.0
+    T[7, 3, 3] = 1.0
+    _fill(_frame_poses_block, T, states, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8)
+    return _by_sample(T, q)
+
+
+def forward_dynamics(
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13,
+    D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23,
+    RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
+) -> np.ndarray:
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 7)."""
+    A, H = inertia_matrix(q, X, D2=D2, RL2=RL2, D4=D4, D6=D6, D7=D7, RL8=RL8), bias(q, qd, X, D2=D2, RL2=RL2, D4=D4, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ)
     return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
-    """Homogeneous transform of every frame j in frame 0, shape (N, 8, 4, 4), at index j - 1."""
-    T = np.zeros((8, 4, 4, np.size(q) // 7))
-    T[:, 3, 3] = 1.0
-    states = (q,)
-    return _by_sample(_fill(_frame_poses_block, T, states, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ), q)
-
-
-def jacobian(q, *, frame=8, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.4, D6=-0.19, D7=0.23, RL8=0.29, GX=-4.905, GZ=-8.496):
-    """J, shape (N, 6, 7): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ).reshape(-1, 8, 4, 4)
+def jacobian(
+    q: np.ndarray, *, frame: int | None = None, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06,
+    RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905,
+    GZ: float = -8.496
+) -> np.ndarray:
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 7)."""
+    T = frame_poses(q, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8).reshape(-1, 8, 4, 4)
     J = np.zeros((len(T), 6, 7))
-    P = T[:, (8 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[8 if frame is None else frame]:
+    last = 8 if frame is None else frame
+    P = T[:, last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -320,8 +401,20 @@ def jacobian(q, *, frame=8, D2=0.21, RL2=0.13, D4=0.17, D5=0.06, RL5=0.11, B6=0.
     return J[0] if np.ndim(q) == 1 else J
 
 
-def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
-    """Fill D, shape (67, 7, N): Gamma_j = sum_k D[k, j] X[k]. q, qd, qdd: (7, N)."""
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
+        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
+        6: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)),), 7: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)), (7, 0, ((5, 1.0),)),),
+        8: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((6, 1.0),)),),
+    }
+
+
+def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
+    """Fill D, shape (67, 7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
@@ -351,12 +444,12 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
-    U232 = S2*QDP1
-    U132 = -C2*QDP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV232 = QP2*W22
-    WP12 = DV232 - U232
+    WP12 = DV232 - S2QDP1
     DV132 = QP2*W12
-    WP22 = U132 - DV132
+    WP22 = -C2QDP1 - DV132
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -408,19 +501,19 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     U314 = DV134 - WP24
     U324 = WP14 + DV234
     VSP14 = VP13 - D4*DV331
-    VSP24 = VP23 - D4*U132
-    VSP34 = VP33 - D4*U232
+    VSP24 = VP23 + D4*C2QDP1
+    VSP34 = VP33 - D4*S2QDP1
     VP14 = S4*VSP14 + C4*VSP34
     VP24 = C4*VSP14 - S4*VSP34
     # Link 6
     W16 = -S6*QP1
     W26 = -C6*QP1
-    U236 = S6*QDP1
-    U136 = -C6*QDP1
+    S6QDP1 = S6*QDP1
+    C6QDP1 = C6*QDP1
     DV236 = QP6*W26
-    WP16 = DV236 - U236
+    WP16 = DV236 - S6QDP1
     DV136 = QP6*W16
-    WP26 = U136 - DV136
+    WP26 = -C6QDP1 - DV136
     DV116 = W16**2
     DV126 = W16*W26
     DV226 = W26**2
@@ -442,12 +535,12 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     WP37 = QDP6 + QDP7
     W17 = -S67*QP1
     W27 = -C67*QP1
-    U237 = S67*QDP1
-    U137 = -C67*QDP1
+    S67QDP1 = S67*QDP1
+    C67QDP1 = C67*QDP1
     DV237 = W37*W27
-    WP17 = DV237 - U237
+    WP17 = DV237 - S67QDP1
     DV137 = W37*W17
-    WP27 = U137 - DV137
+    WP27 = -C67QDP1 - DV137
     DV117 = W17**2
     DV127 = W17*W27
     DV227 = W27**2
@@ -552,7 +645,7 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     D[9, 0] = C2*U122 - S2*DW232                                      # DG1YZ2
     D[11, 0] = C2*VSP22 + U112V121 + U212V221 + D2*U312               # DG1MX2
     D[12, 0] = U122V121 + U222V221 + D2*U322 - S2*VSP22               # DG1MY2
-    D[16, 0] = C2*VP23 + U132*V121 + U232*V221 - S2*VP33 - DV331*V131  # DG1MX3
+    D[16, 0] = C2*VP23 + S2QDP1*V221 - S2*VP33 - DV331*V131 - C2QDP1*V121  # DG1MX3
     D[17, 0] = -C2*VP13 - U212V221 - U112V121 - U312*V131             # DG1MY3
     D[18, 0] = S2*VP13 - U222V221 - U122V121 - U322*V131              # DG1MZ3
     D[19, 0] = VP13*V131 - VP23*V121 - VP33*V221                      # DG1M3
@@ -585,14 +678,14 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     # Joint 2
     D[6, 1] = -DV122                # DG2XX2
     D[7, 1] = DW122                 # DG2XY2
-    D[8, 1] = -U232                 # DG2XZ2
-    D[9, 1] = U132                  # DG2YZ2
+    D[8, 1] = -S2QDP1               # DG2XZ2
+    D[9, 1] = -C2QDP1               # DG2YZ2
     D[10, 1] = QDP2                 # DG2ZZ2
     D[11, 1] = VP22                 # DG2MX2
     D[12, 1] = -VP12                # DG2MY2
     D[13, 1] = QP2                  # DG2FV2
     D[14, 1] = np.sign(QP2)         # DG2FS2
-    D[16, 1] = r3*U132              # DG2MX3
+    D[16, 1] = -r3*C2QDP1           # DG2MX3
     D[17, 1] = VP33 - r3*U112       # DG2MY3
     D[18, 1] = DF2MZ3 - VP23        # DG2MZ3
     D[19, 1] = -r3*VP23             # DG2M3
@@ -604,7 +697,7 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     D[29, 1] = -C4*VSP24 - r3*U314  # DG2MX4
     D[30, 1] = S4*VSP24 - r3*U324   # DG2MY4
     # Joint 3
-    D[16, 2] = -U232             # DG3MX3
+    D[16, 2] = -S2QDP1           # DG3MX3
     D[17, 2] = U212              # DG3MY3
     D[18, 2] = U222              # DG3MZ3
     D[19, 2] = VP33              # DG3M3
@@ -627,8 +720,8 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     # Joint 6
     D[35, 4] = -DV126                                      # DG6XX6
     D[36, 4] = DW126                                       # DG6XY6
-    D[37, 4] = -U236                                       # DG6XZ6
-    D[38, 4] = U136                                        # DG6YZ6
+    D[37, 4] = -S6QDP1                                     # DG6XZ6
+    D[38, 4] = -C6QDP1                                     # DG6YZ6
     D[39, 4] = QDP6                                        # DG6ZZ6
     D[40, 4] = VP26                                        # DG6MX6
     D[41, 4] = -VP16                                       # DG6MY6
@@ -636,8 +729,8 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     D[43, 4] = np.sign(QP6)                                # DG6FS6
     D[45, 4] = -DV127                                      # DG6XX7
     D[46, 4] = DW127                                       # DG6XY7
-    D[47, 4] = -U237                                       # DG6XZ7
-    D[48, 4] = U137                                        # DG6YZ7
+    D[47, 4] = -S67QDP1                                    # DG6XZ7
+    D[48, 4] = -C67QDP1                                    # DG6YZ7
     D[49, 4] = WP37                                        # DG6ZZ7
     D[50, 4] = VP27 + U117*V176 + U217*V276                # DG6MX7
     D[51, 4] = U127*V176 + U227*V276 - VP17                # DG6MY7
@@ -651,8 +744,8 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     # Joint 7
     D[45, 5] = -DV127                          # DG7XX7
     D[46, 5] = DW127                           # DG7XY7
-    D[47, 5] = -U237                           # DG7XZ7
-    D[48, 5] = U137                            # DG7YZ7
+    D[47, 5] = -S67QDP1                        # DG7XZ7
+    D[48, 5] = -C67QDP1                        # DG7YZ7
     D[49, 5] = WP37                            # DG7ZZ7
     D[50, 5] = VP27                            # DG7MX7
     D[51, 5] = -VP17                           # DG7MY7
@@ -679,8 +772,8 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, G
     D[65, 6] = np.sign(QP8)  # DG8FS8
 
 
-def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
-    """Fill GAM, shape (7, N). q, qd, qdd: (7, N)."""
+def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ):
+    """Fill GAM, shape (7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
@@ -941,8 +1034,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, RL2, D4, D5, RL5, B6, D6, D7
     GAM[6] = OFFSET8 + N38 + Ia8*QDP8 + FV8*QP8 + FS8*np.sign(QP8)
 
 
-def _inertia_matrix_block(q, A, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
-    """Fill A, shape (7, 7, N): column i is Gamma for a unit acceleration of joint i from rest. q: (7, N)."""
+def _inertia_matrix_block(q, A, X, D2, RL2, D4, D6, D7, RL8):
+    """Fill A, shape (7, 7, N), where it is not constant, from q (7, N)."""
     # Inputs
     q2 = q[1]
     q3 = q[2]
@@ -1146,18 +1239,9 @@ def _inertia_matrix_block(q, A, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ
     A[1, 1] = NE322
     A[2, 1] = A[1, 2] = MY3R
     A[3, 1] = A[1, 3] = N342
-    A[4, 1] = A[1, 4] = 0.0
-    A[5, 1] = A[1, 5] = 0.0
-    A[6, 1] = A[1, 6] = 0.0
     A[2, 2] = M3R + Ia3
     A[3, 2] = A[2, 3] = N343
-    A[4, 2] = A[2, 4] = 0.0
-    A[5, 2] = A[2, 5] = 0.0
-    A[6, 2] = A[2, 6] = 0.0
     A[3, 3] = ZZ4R + Ia4
-    A[4, 3] = A[3, 4] = 0.0
-    A[5, 3] = A[3, 5] = 0.0
-    A[6, 3] = A[3, 6] = 0.0
     A[4, 4] = NE366
     A[5, 4] = A[4, 5] = NE376
     A[6, 4] = A[4, 6] = N386
@@ -1166,8 +1250,8 @@ def _inertia_matrix_block(q, A, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ
     A[6, 6] = ZZ8 + Ia8
 
 
-def _bias_block(q, qd, GAM, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
-    """Fill GAM, shape (7, N), for qdd = 0. q, qd: (7, N)."""
+def _bias_block(q, qd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ):
+    """Fill GAM, shape (7, N), where it is not constant, from q (7, N); qd (7, N)."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
@@ -1458,8 +1542,8 @@ def _bias_block(q, qd, GAM, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
     GAM[6] = OFFSET8 + N38 + FV8*QP8 + FS8*np.sign(QP8)
 
 
-def _gravity_block(q, GAM, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
-    """Fill GAM, shape (7, N), at rest. q: (7, N)."""
+def _gravity_block(q, GAM, X, D2, RL2, GX, GZ):
+    """Fill GAM, shape (7, N), where it is not constant, from q (7, N)."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     MX1R = X[1]
@@ -1571,8 +1655,8 @@ def _gravity_block(q, GAM, X, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
     GAM[6] = OFFSET8 + N38
 
 
-def _frame_poses_block(q, T, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
-    """Fill T, shape (8, 4, 4, N). q: (7, N)."""
+def _frame_poses_block(q, T, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8):
+    """Fill T, shape (8, 4, 4, N), where it is not constant, from q (7, N)."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     # Trigonometry
@@ -1643,97 +1727,84 @@ def _frame_poses_block(q, T, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8, GX, GZ):
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 0, 2] = 0.0
     T[0, 1, 0] = S1
     T[0, 1, 1] = C1
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
-    T[0, 2, 3] = 0.0
     T[1, 0, 0] = R112
     T[1, 0, 1] = R122
     T[1, 0, 2] = -S1
+    T[1, 0, 3] = P12
     T[1, 1, 0] = R212
     T[1, 1, 1] = R222
     T[1, 1, 2] = C1
+    T[1, 1, 3] = P22
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[1, 2, 2] = 0.0
-    T[1, 0, 3] = P12
-    T[1, 1, 3] = P22
-    T[1, 2, 3] = 0.0
     T[2, 0, 0] = -S1
     T[2, 0, 1] = -R112
     T[2, 0, 2] = -R122
+    T[2, 0, 3] = P13
     T[2, 1, 0] = C1
     T[2, 1, 1] = -R212
     T[2, 1, 2] = -R222
-    T[2, 2, 0] = 0.0
+    T[2, 1, 3] = P23
     T[2, 2, 1] = S2
     T[2, 2, 2] = C2
-    T[2, 0, 3] = P13
-    T[2, 1, 3] = P23
     T[2, 2, 3] = P33
     T[3, 0, 0] = R114
     T[3, 0, 1] = R124
     T[3, 0, 2] = -R112
+    T[3, 0, 3] = P14
     T[3, 1, 0] = R214
     T[3, 1, 1] = R224
     T[3, 1, 2] = -R212
+    T[3, 1, 3] = P24
     T[3, 2, 0] = R314
     T[3, 2, 1] = R324
     T[3, 2, 2] = S2
-    T[3, 0, 3] = P14
-    T[3, 1, 3] = P24
     T[3, 2, 3] = P33
     T[4, 0, 0] = R114
     T[4, 0, 1] = -R112
     T[4, 0, 2] = -R124
+    T[4, 0, 3] = P15
     T[4, 1, 0] = R214
     T[4, 1, 1] = -R212
     T[4, 1, 2] = -R224
+    T[4, 1, 3] = P25
     T[4, 2, 0] = R314
     T[4, 2, 1] = S2
     T[4, 2, 2] = -R324
-    T[4, 0, 3] = P15
-    T[4, 1, 3] = P25
     T[4, 2, 3] = P35
     T[5, 0, 0] = R116
     T[5, 0, 1] = R126
     T[5, 0, 2] = -C1
+    T[5, 0, 3] = P16
     T[5, 1, 0] = R216
     T[5, 1, 1] = R226
     T[5, 1, 2] = -S1
+    T[5, 1, 3] = P26
     T[5, 2, 0] = -S6
     T[5, 2, 1] = -C6
-    T[5, 2, 2] = 0.0
-    T[5, 0, 3] = P16
-    T[5, 1, 3] = P26
     T[5, 2, 3] = B6
     T[6, 0, 0] = R117
     T[6, 0, 1] = R127
     T[6, 0, 2] = -C1
+    T[6, 0, 3] = P17
     T[6, 1, 0] = R217
     T[6, 1, 1] = R227
     T[6, 1, 2] = -S1
+    T[6, 1, 3] = P27
     T[6, 2, 0] = -S67
     T[6, 2, 1] = -C67
-    T[6, 2, 2] = 0.0
-    T[6, 0, 3] = P17
-    T[6, 1, 3] = P27
     T[6, 2, 3] = P37
     T[7, 0, 0] = R118
     T[7, 0, 1] = R128
     T[7, 0, 2] = -R127
+    T[7, 0, 3] = P18
     T[7, 1, 0] = R218
     T[7, 1, 1] = R228
     T[7, 1, 2] = -R227
+    T[7, 1, 3] = P28
     T[7, 2, 0] = R318
     T[7, 2, 1] = R328
     T[7, 2, 2] = C67
-    T[7, 0, 3] = P18
-    T[7, 1, 3] = P28
     T[7, 2, 3] = P38

@@ -1,6 +1,6 @@
 """Stäubli TX40, 6 revolute joints: base parameters, regressor, dynamics as CasADi functions.
 
-GENERATED from tx40.yaml, sha256 fb8651f3f1d0, by symgen 0.1.0. Do not edit; symgen generate tx40 --target casadi
+GENERATED from tx40.yaml, sha256 fb8651f3f1d0, by symgen 0.2.0. Do not edit; symgen generate tx40 --target casadi
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta    r
@@ -39,6 +39,32 @@ Base parameters, 60 of 86; Gautier and Khalil (1990), exact over F_p
     as they are: FV1 FS1 OFFSET1 XY2 YZ2 MY2 FV2 FS2 OFFSET2 XY3 XZ3 YZ3 MX3 Ia3 FV3 FS3 OFFSET3 XY4 XZ4 YZ4 MX4 Ia4 FV4
         FS4 OFFSET4 XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5 OFFSET5 XY6 XZ6 YZ6 ZZ6 MX6 MY6 Ia6 FV6 FS6 OFFSET6 FVM6 FSM6
 No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
+
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    th   joint angle with its constant, rad
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    DW   differences of their squares
+    U    skew(WP) + skew(W)**2
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    Z    axis of a joint, in the frame of a later link
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    VS   the same, in the antecedent's frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    E    force transmitted to a link by its antecedent, in its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    R    orientation of a frame in frame 0
+    P    origin of a frame in frame 0
 
 Cost per sample
     regressor         355 multiplications, 263 additions, 6 sin, 6 cos
@@ -144,13 +170,6 @@ VALUES = {
     'ZZ6': 0.00012, 'MX6': 0.000208, 'MY6': -0.000208, 'MZ6': 0.01245, 'M6': 0.21, 'Ia6': 0.014, 'FV6': 0.721,
     'FS6': 1.8, 'OFFSET6': 0.166, 'FVM6': 0.7, 'FSM6': 1.6,
 }
-_PATHS = {
-    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
-    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),))),
-    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
-    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),))),
-    6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),))),
-}
 
 _COLUMNS = {"q": 6, "qd": 6, "qdd": 6, "tau": 6, "X": 60, "standard": 86}
 
@@ -168,10 +187,11 @@ def _function(name, reads, inputs, results):
     )
 
 
-def _modelled(name, reads, model, *labels):
-    """ca.Function of a model below, which takes each column as a list of scalars and returns a matrix, or a list of matrices."""
+def _modelled(name, reads, model, takes, *labels):
+    """ca.Function of a model below, which takes columns as lists of scalars, and constants, and returns a matrix, or a list of matrices."""
     inputs = _inputs(reads)
-    found = model(*(ca.vertsplit(x) for x in inputs[:len(reads)]), *inputs[len(reads):])
+    known = dict(zip([*reads, *CONSTANTS], [*(ca.vertsplit(x) for x in inputs[:len(reads)]), *inputs[len(reads):]]))
+    found = model(*[known[x] for x in takes])
     return _function(name, reads, inputs, dict(zip(labels, found if isinstance(found, list) else [found])))
 
 
@@ -182,13 +202,13 @@ def _derivatives(name, reads, function, result):
     return _function(name, reads, inputs, {f"d{result}_d{x}": ca.jacobian(value, inputs[k]) for k, x in enumerate(reads)})
 
 
-def _base_parameters(standard, D3, RL4, g):
+def _base_parameters(standard, D3, RL4):
     """X from the standard parameters."""
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
-        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5,
-        M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, FVM6, FSM6
+        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, _, _, Ia2, FV2,
+        FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4, XY4, XZ4, YY4, YZ4,
+        ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5,
+        OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, FVM6, FSM6
     ) = standard
     ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + D3**2*(M3 + M4 + M5 + M6)
     XX2R = XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)
@@ -213,7 +233,7 @@ def _base_parameters(standard, D3, RL4, g):
 
 
 def _regressor(q, qd, qdd, D3, RL4, g):
-    """D, shape (6, 60), Gamma = D X."""
+    """D of Gamma = D X. Shape (6, 60)."""
     D = ca.SX(60, 6)
     D[3, 0] = 1.0
     D[13, 1] = 1.0
@@ -246,12 +266,12 @@ def _regressor(q, qd, qdd, D3, RL4, g):
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
-    U232 = S2*QDP1
-    U132 = -C2*QDP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV232 = QP2*W22
-    WP12 = DV232 - U232
+    WP12 = DV232 - S2QDP1
     DV132 = QP2*W12
-    WP22 = U132 - DV132
+    WP22 = -C2QDP1 - DV132
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -271,12 +291,12 @@ def _regressor(q, qd, qdd, D3, RL4, g):
     WP33 = QDP2 + QDP3
     W13 = -S23*QP1
     W23 = -C23*QP1
-    U233 = S23*QDP1
-    U133 = -C23*QDP1
+    S23QDP1 = S23*QDP1
+    C23QDP1 = C23*QDP1
     DV233 = W33*W23
-    WP13 = DV233 - U233
+    WP13 = DV233 - S23QDP1
     DV133 = W33*W13
-    WP23 = U133 - DV133
+    WP23 = -C23QDP1 - DV133
     DV113 = W13**2
     DV123 = W13*W23
     DV223 = W23**2
@@ -446,8 +466,8 @@ def _regressor(q, qd, qdd, D3, RL4, g):
     DN2ZZ6 = DV236*Z162 - DV136Z262 - WP36*Z252
     DN2MX6 = VP25*Z262 - VP26*Z252
     DN2MY6 = VP16*Z252 - VP25*Z162
-    QP56 = QP5 + QP6
-    signQP56 = ca.sign(QP56)
+    QPFSM6 = QP5 + QP6
+    signQPFSM6 = ca.sign(QPFSM6)
     # Joint 1
     D[0, 0] = QDP1                                                    # DG1ZZ1
     D[1, 0] = QP1                                                     # DG1FV1
@@ -486,8 +506,8 @@ def _regressor(q, qd, qdd, D3, RL4, g):
     # Joint 2
     D[4, 1] = -DV122                                       # DG2XX2
     D[5, 1] = DW122                                        # DG2XY2
-    D[6, 1] = -U232                                        # DG2XZ2
-    D[7, 1] = U132                                         # DG2YZ2
+    D[6, 1] = -S2QDP1                                      # DG2XZ2
+    D[7, 1] = -C2QDP1                                      # DG2YZ2
     D[8, 1] = QDP2                                         # DG2ZZ2
     D[9, 1] = VP22                                         # DG2MX2
     D[10, 1] = -VP12                                       # DG2MY2
@@ -495,8 +515,8 @@ def _regressor(q, qd, qdd, D3, RL4, g):
     D[12, 1] = ca.sign(QP2)                                # DG2FS2
     D[14, 1] = -DV123                                      # DG2XX3
     D[15, 1] = DW123                                       # DG2XY3
-    D[16, 1] = -U233                                       # DG2XZ3
-    D[17, 1] = U133                                        # DG2YZ3
+    D[16, 1] = -S23QDP1                                    # DG2XZ3
+    D[17, 1] = -C23QDP1                                    # DG2YZ3
     D[18, 1] = WP33                                        # DG2ZZ3
     D[19, 1] = VP23 + U113*V132 + U213*V232                # DG2MX3
     D[20, 1] = U123*V132 + U223*V232 - VP13                # DG2MY3
@@ -524,8 +544,8 @@ def _regressor(q, qd, qdd, D3, RL4, g):
     # Joint 3
     D[14, 2] = -DV123                                      # DG3XX3
     D[15, 2] = DW123                                       # DG3XY3
-    D[16, 2] = -U233                                       # DG3XZ3
-    D[17, 2] = U133                                        # DG3YZ3
+    D[16, 2] = -S23QDP1                                    # DG3XZ3
+    D[17, 2] = -C23QDP1                                    # DG3YZ3
     D[18, 2] = WP33                                        # DG3ZZ3
     D[19, 2] = VP23                                        # DG3MX3
     D[20, 2] = -VP13                                       # DG3MY3
@@ -598,7 +618,7 @@ def _regressor(q, qd, qdd, D3, RL4, g):
     D[53, 4] = -S6*VP25            # DG5MY6
     D[54, 4] = QDP6                # DG5Ia6
     D[58, 4] = QP6                 # DG5FVM6
-    D[59, 4] = signQP56            # DG5FSM6
+    D[59, 4] = signQPFSM6          # DG5FSM6
     # Joint 6
     D[47, 5] = -DV126        # DG6XX6
     D[48, 5] = DW126         # DG6XY6
@@ -611,12 +631,12 @@ def _regressor(q, qd, qdd, D3, RL4, g):
     D[55, 5] = QP6           # DG6FV6
     D[56, 5] = ca.sign(QP6)  # DG6FS6
     D[58, 5] = QP5           # DG6FVM6
-    D[59, 5] = signQP56      # DG6FSM6
+    D[59, 5] = signQPFSM6    # DG6FSM6
     return D.T
 
 
 def _inverse_dynamics(q, qd, qdd, X, D3, RL4, g):
-    """Joint torques Gamma."""
+    """Joint torques Gamma. Shape (6, 1)."""
     GAM = ca.SX(6, 1)
     # Inputs
     q2 = q[1]
@@ -843,20 +863,20 @@ def _inverse_dynamics(q, qd, qdd, X, D3, RL4, g):
     N31 = ZZ1R*QDP1
     NE31 = N31 - S2*NE12 - C2*NE22
     # Friction, actuators
-    QP56 = QP5 + QP6
-    FSM6signQP56 = FSM6*ca.sign(QP56)
+    QPFSM6 = QP5 + QP6
+    FSM6signQPFSM6 = FSM6*ca.sign(QPFSM6)
     # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*ca.sign(QP1)
-    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*ca.sign(QP2)
-    GAM[2] = OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*ca.sign(QP3)
-    GAM[3] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*ca.sign(QP4)
-    GAM[4] = OFFSET5 + NE35 + Ia5*QDP5 + Ia6*QDP6 + FV5*QP5 + FS5*ca.sign(QP5) + FVM6*QP6 + FSM6signQP56
-    GAM[5] = OFFSET6 + N36 + Ia6*(QDP5 + QDP6) + FV6*QP6 + FS6*ca.sign(QP6) + FVM6*QP5 + FSM6signQP56
+    GAM[0, 0] = OFFSET1 + NE31 + FV1*QP1 + FS1*ca.sign(QP1)
+    GAM[1, 0] = OFFSET2 + NE32 + FV2*QP2 + FS2*ca.sign(QP2)
+    GAM[2, 0] = OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*ca.sign(QP3)
+    GAM[3, 0] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*ca.sign(QP4)
+    GAM[4, 0] = OFFSET5 + NE35 + Ia5*QDP5 + Ia6*QDP6 + FV5*QP5 + FS5*ca.sign(QP5) + FVM6*QP6 + FSM6signQPFSM6
+    GAM[5, 0] = OFFSET6 + N36 + Ia6*(QDP5 + QDP6) + FV6*QP6 + FS6*ca.sign(QP6) + FVM6*QP5 + FSM6signQPFSM6
     return GAM
 
 
-def _inertia_matrix(q, X, D3, RL4, g):
-    """A(q): column i is Gamma for a unit acceleration of joint i from rest."""
+def _inertia_matrix(q, X, D3, RL4):
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (6, 6)."""
     A = ca.SX(6, 6)
     # Inputs
     q2 = q[1]
@@ -1013,12 +1033,12 @@ def _inertia_matrix(q, X, D3, RL4, g):
     F162 = MY6*WP252
     F262 = -MX6*WP252
     F362 = MY6*WP162 - MX6*WP262
-    XX6RWP162pXZ6WP252pXY6WP262 = XX6R*WP162 + XY6*WP262 - XZ6*WP252
-    XY6WP162pYZ6WP252 = XY6*WP162 - YZ6*WP252
-    ZZ6WP252pYZ6WP262pXZ6WP162 = YZ6*WP262 + XZ6*WP162 - ZZ6*WP252
-    N162 = XX6RWP162pXZ6WP252pXY6WP262 - MY6*VP252
-    N262 = XY6WP162pYZ6WP252 + MX6*VP252
-    N362 = ZZ6WP252pYZ6WP262pXZ6WP162 + MX6*VP262 - MY6*VP162
+    XX6RWP162pXY6WP262mXZ6WP252 = XX6R*WP162 + XY6*WP262 - XZ6*WP252
+    XY6WP162mYZ6WP252 = XY6*WP162 - YZ6*WP252
+    YZ6WP262pXZ6WP162mZZ6WP252 = YZ6*WP262 + XZ6*WP162 - ZZ6*WP252
+    N162 = XX6RWP162pXY6WP262mXZ6WP252 - MY6*VP252
+    N262 = XY6WP162mYZ6WP252 + MX6*VP252
+    N362 = YZ6WP262pXZ6WP162mZZ6WP252 + MX6*VP262 - MY6*VP162
     FDI162 = C6*F162 - S6*F262
     FDI362 = S6*F162 + C6*F262
     # Joint 5
@@ -1028,12 +1048,12 @@ def _inertia_matrix(q, X, D3, RL4, g):
     E152 = FDI162 + F152
     E252 = F252 - F362
     E352 = FDI362 + F352
-    XX5RWP152pXZ5C4mXY5WP252 = XX5R*WP152 + XZ5*C4 + XY5*WP252
+    XX5RWP152pXZ5C4pXY5WP252 = XX5R*WP152 + XZ5*C4 + XY5*WP252
     XY5WP152pYZ5C4 = XY5*WP152 + YZ5*C4
-    ZZ5RC4mYZ5WP252pXZ5WP152 = ZZ5R*C4 + YZ5*WP252 + XZ5*WP152
-    N152 = XX5RWP152pXZ5C4mXY5WP252 + MY5R*VP242
+    ZZ5RC4pYZ5WP252pXZ5WP152 = ZZ5R*C4 + YZ5*WP252 + XZ5*WP152
+    N152 = XX5RWP152pXZ5C4pXY5WP252 + MY5R*VP242
     N252 = XY5WP152pYZ5C4 - MX5*VP242
-    N352 = ZZ5RC4mYZ5WP252pXZ5WP152 + MX5*VP252 - MY5R*VP152
+    N352 = ZZ5RC4pYZ5WP252pXZ5WP152 + MX5*VP252 - MY5R*VP152
     NE152 = C6*N162 + N152 - S6*N262
     NE252 = N252 - N362
     NE352 = S6*N162 + C6*N262 + N352
@@ -1071,13 +1091,13 @@ def _inertia_matrix(q, X, D3, RL4, g):
     VP163 = C6*VP153 + S6*VP243
     VP263 = C6*VP243 - S6*VP153
     # Joint 6
-    N163 = XX6RWP162pXZ6WP252pXY6WP262 - MY6*VP253
-    N263 = XY6WP162pYZ6WP252 + MX6*VP253
-    N363 = ZZ6WP252pYZ6WP262pXZ6WP162 + MX6*VP263 - MY6*VP163
+    N163 = XX6RWP162pXY6WP262mXZ6WP252 - MY6*VP253
+    N263 = XY6WP162mYZ6WP252 + MX6*VP253
+    N363 = YZ6WP262pXZ6WP162mZZ6WP252 + MX6*VP263 - MY6*VP163
     # Joint 5
-    N153 = XX5RWP152pXZ5C4mXY5WP252 + MY5R*VP243
+    N153 = XX5RWP152pXZ5C4pXY5WP252 + MY5R*VP243
     N253 = XY5WP152pYZ5C4 - MX5*VP243
-    N353 = ZZ5RC4mYZ5WP252pXZ5WP152 + MX5*VP253 - MY5R*VP153
+    N353 = ZZ5RC4pYZ5WP252pXZ5WP152 + MX5*VP253 - MY5R*VP153
     NE153 = C6*N163 + N153 - S6*N263
     NE253 = N253 - N363
     NE353 = S6*N163 + C6*N263 + N353
@@ -1136,7 +1156,7 @@ def _inertia_matrix(q, X, D3, RL4, g):
 
 
 def _bias(q, qd, X, D3, RL4, g):
-    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset."""
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (6, 1)."""
     GAM = ca.SX(6, 1)
     # Inputs
     q2 = q[1]
@@ -1393,20 +1413,20 @@ def _bias(q, qd, X, D3, RL4, g):
     NE32 = NE33 + D3*FDI23 + N32
     NE31 = -S2*NE12 - C2*NE22
     # Friction, actuators
-    QP56 = QP5 + QP6
-    FSM6signQP56 = FSM6*ca.sign(QP56)
+    QPFSM6 = QP5 + QP6
+    FSM6signQPFSM6 = FSM6*ca.sign(QPFSM6)
     # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*ca.sign(QP1)
-    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*ca.sign(QP2)
-    GAM[2] = OFFSET3 + NE33 + FV3*QP3 + FS3*ca.sign(QP3)
-    GAM[3] = OFFSET4 + NE34 + FV4*QP4 + FS4*ca.sign(QP4)
-    GAM[4] = OFFSET5 + NE35 + FV5*QP5 + FS5*ca.sign(QP5) + FVM6*QP6 + FSM6signQP56
-    GAM[5] = OFFSET6 + N36 + FV6*QP6 + FS6*ca.sign(QP6) + FVM6*QP5 + FSM6signQP56
+    GAM[0, 0] = OFFSET1 + NE31 + FV1*QP1 + FS1*ca.sign(QP1)
+    GAM[1, 0] = OFFSET2 + NE32 + FV2*QP2 + FS2*ca.sign(QP2)
+    GAM[2, 0] = OFFSET3 + NE33 + FV3*QP3 + FS3*ca.sign(QP3)
+    GAM[3, 0] = OFFSET4 + NE34 + FV4*QP4 + FS4*ca.sign(QP4)
+    GAM[4, 0] = OFFSET5 + NE35 + FV5*QP5 + FS5*ca.sign(QP5) + FVM6*QP6 + FSM6signQPFSM6
+    GAM[5, 0] = OFFSET6 + N36 + FV6*QP6 + FS6*ca.sign(QP6) + FVM6*QP5 + FSM6signQPFSM6
     return GAM
 
 
-def _gravity(q, X, D3, RL4, g):
-    """Gamma at rest without friction: gravity, offset and springs."""
+def _gravity(q, X, g):
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (6, 1)."""
     GAM = ca.SX(6, 1)
     # Inputs
     q2 = q[1]
@@ -1485,18 +1505,25 @@ def _gravity(q, X, D3, RL4, g):
     NE32 = NE33 + N32
     NE31 = -S2*NE12 - C2*NE22
     # Torques
-    GAM[0] = OFFSET1 + NE31
-    GAM[1] = OFFSET2 + NE32
-    GAM[2] = OFFSET3 + NE33
-    GAM[3] = OFFSET4 + NE34
-    GAM[4] = OFFSET5 + NE35
-    GAM[5] = OFFSET6 + N36
+    GAM[0, 0] = OFFSET1 + NE31
+    GAM[1, 0] = OFFSET2 + NE32
+    GAM[2, 0] = OFFSET3 + NE33
+    GAM[3, 0] = OFFSET4 + NE34
+    GAM[4, 0] = OFFSET5 + NE35
+    GAM[5, 0] = OFFSET6 + N36
     return GAM
 
 
-def _frame_poses(q, D3, RL4, g):
-    """Homogeneous transform of every frame j in frame 0."""
-    T = {}
+def _frame_poses(q, D3, RL4):
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (6, 4, 4)."""
+    T = [ca.SX(4, 4) for _ in range(6)]
+    T[0][2, 2] = 1.0
+    T[0][3, 3] = 1.0
+    T[1][3, 3] = 1.0
+    T[2][3, 3] = 1.0
+    T[3][3, 3] = 1.0
+    T[4][3, 3] = 1.0
+    T[5][3, 3] = 1.0
     # Inputs
     q1, q2, q3, q4, q5, q6 = q
     # Trigonometry
@@ -1551,84 +1578,71 @@ def _frame_poses(q, D3, RL4, g):
     R316 = C6*R315 + S6*R324
     R326 = C6*R324 - S6*R315
     # Poses
-    T[0, 0, 0] = C1
-    T[0, 0, 1] = -S1
-    T[0, 0, 2] = 0.0
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[0, 1, 2] = 0.0
-    T[0, 2, 0] = 0.0
-    T[0, 2, 1] = 0.0
-    T[0, 2, 2] = 1.0
-    T[0, 0, 3] = 0.0
-    T[0, 1, 3] = 0.0
-    T[0, 2, 3] = 0.0
-    T[1, 0, 0] = R112
-    T[1, 0, 1] = R122
-    T[1, 0, 2] = -S1
-    T[1, 1, 0] = R212
-    T[1, 1, 1] = R222
-    T[1, 1, 2] = C1
-    T[1, 2, 0] = -S2
-    T[1, 2, 1] = -C2
-    T[1, 2, 2] = 0.0
-    T[1, 0, 3] = 0.0
-    T[1, 1, 3] = 0.0
-    T[1, 2, 3] = 0.0
-    T[2, 0, 0] = R113
-    T[2, 0, 1] = R123
-    T[2, 0, 2] = -S1
-    T[2, 1, 0] = R213
-    T[2, 1, 1] = R223
-    T[2, 1, 2] = C1
-    T[2, 2, 0] = -S23
-    T[2, 2, 1] = -C23
-    T[2, 2, 2] = 0.0
-    T[2, 0, 3] = P13
-    T[2, 1, 3] = P23
-    T[2, 2, 3] = P33
-    T[3, 0, 0] = R114
-    T[3, 0, 1] = R124
-    T[3, 0, 2] = -R123
-    T[3, 1, 0] = R214
-    T[3, 1, 1] = R224
-    T[3, 1, 2] = -R223
-    T[3, 2, 0] = R314
-    T[3, 2, 1] = R324
-    T[3, 2, 2] = C23
-    T[3, 0, 3] = P14
-    T[3, 1, 3] = P24
-    T[3, 2, 3] = P34
-    T[4, 0, 0] = R115
-    T[4, 0, 1] = R125
-    T[4, 0, 2] = R124
-    T[4, 1, 0] = R215
-    T[4, 1, 1] = R225
-    T[4, 1, 2] = R224
-    T[4, 2, 0] = R315
-    T[4, 2, 1] = R325
-    T[4, 2, 2] = R324
-    T[4, 0, 3] = P14
-    T[4, 1, 3] = P24
-    T[4, 2, 3] = P34
-    T[5, 0, 0] = R116
-    T[5, 0, 1] = R126
-    T[5, 0, 2] = -R125
-    T[5, 1, 0] = R216
-    T[5, 1, 1] = R226
-    T[5, 1, 2] = -R225
-    T[5, 2, 0] = R316
-    T[5, 2, 1] = R326
-    T[5, 2, 2] = -R325
-    T[5, 0, 3] = P14
-    T[5, 1, 3] = P24
-    T[5, 2, 3] = P34
-    return _poses(T)
+    T[0][0, 0] = C1
+    T[0][0, 1] = -S1
+    T[0][1, 0] = S1
+    T[0][1, 1] = C1
+    T[1][0, 0] = R112
+    T[1][0, 1] = R122
+    T[1][0, 2] = -S1
+    T[1][1, 0] = R212
+    T[1][1, 1] = R222
+    T[1][1, 2] = C1
+    T[1][2, 0] = -S2
+    T[1][2, 1] = -C2
+    T[2][0, 0] = R113
+    T[2][0, 1] = R123
+    T[2][0, 2] = -S1
+    T[2][0, 3] = P13
+    T[2][1, 0] = R213
+    T[2][1, 1] = R223
+    T[2][1, 2] = C1
+    T[2][1, 3] = P23
+    T[2][2, 0] = -S23
+    T[2][2, 1] = -C23
+    T[2][2, 3] = P33
+    T[3][0, 0] = R114
+    T[3][0, 1] = R124
+    T[3][0, 2] = -R123
+    T[3][0, 3] = P14
+    T[3][1, 0] = R214
+    T[3][1, 1] = R224
+    T[3][1, 2] = -R223
+    T[3][1, 3] = P24
+    T[3][2, 0] = R314
+    T[3][2, 1] = R324
+    T[3][2, 2] = C23
+    T[3][2, 3] = P34
+    T[4][0, 0] = R115
+    T[4][0, 1] = R125
+    T[4][0, 2] = R124
+    T[4][0, 3] = P14
+    T[4][1, 0] = R215
+    T[4][1, 1] = R225
+    T[4][1, 2] = R224
+    T[4][1, 3] = P24
+    T[4][2, 0] = R315
+    T[4][2, 1] = R325
+    T[4][2, 2] = R324
+    T[4][2, 3] = P34
+    T[5][0, 0] = R116
+    T[5][0, 1] = R126
+    T[5][0, 2] = -R125
+    T[5][0, 3] = P14
+    T[5][1, 0] = R216
+    T[5][1, 1] = R226
+    T[5][1, 2] = -R225
+    T[5][1, 3] = P24
+    T[5][2, 0] = R316
+    T[5][2, 1] = R326
+    T[5][2, 2] = -R325
+    T[5][2, 3] = P34
+    return T
 
 
 def _forward_dynamics(q, qd, tau, X, D3, RL4, g):
     """qdd = A(q)**-1 (tau - bias)."""
-    return _solved(_inertia_matrix(q, X, D3, RL4, g), ca.vertcat(*tau) - _bias(q, qd, X, D3, RL4, g))
+    return _solved(_inertia_matrix(q, X, D3, RL4), ca.vertcat(*tau) - _bias(q, qd, X, D3, RL4, g))
 
 
 def _solved(A, b):
@@ -1648,18 +1662,12 @@ def _solved(A, b):
     return ca.vertcat(*x)
 
 
-def _poses(T):
-    """4 x 4 matrix of every frame from the entries T[frame - 1, row, column] of their first three rows."""
-    last = ca.horzcat(0.0, 0.0, 0.0, 1.0)
-    return [ca.vertcat(*(ca.horzcat(*(T[j, i, k] for k in range(4))) for i in range(3)), last) for j in range(6)]
-
-
-def _jacobian(frame, q, D3, RL4, g):
+def _jacobian(frame, q, D3, RL4):
     """Velocity of the origin of `frame`, then its angular velocity, in frame 0, per joint rate."""
-    T = _frame_poses(q, D3, RL4, g)
+    T = _frame_poses(q, D3, RL4)
     J = ca.SX(6, 6)
     P = T[frame - 1][:3, 3]
-    for j, sigma, rates in _PATHS[frame]:
+    for j, sigma, rates in _paths()[frame]:
         z = T[j - 1][:3, 2]
         v, w = (z, ca.SX(3, 1)) if sigma else (ca.cross(z, P - T[j - 1][:3, 3]), z)
         for k, rate in rates:
@@ -1668,19 +1676,30 @@ def _jacobian(frame, q, D3, RL4, g):
     return J
 
 
-def jacobian_of(frame):
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
+        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)),),
+        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),)),),
+    }
+
+
+def jacobian_of(frame: int) -> ca.Function:
     """ca.Function J (6, 6) of any frame: velocity of its origin, then angular velocity, in frame 0."""
-    return _modelled(f"jacobian_{frame}", ["q"], lambda q, *constants: _jacobian(frame, q, *constants), "J")
+    return _modelled(f"jacobian_{frame}", ["q"], lambda *known: _jacobian(frame, *known), ['q', 'D3', 'RL4'], "J")
 
 
-base_parameters = _modelled("base_parameters", ["standard"], _base_parameters, "X")
-regressor = _modelled("regressor", ["q", "qd", "qdd"], _regressor, "D")
-inverse_dynamics = _modelled("inverse_dynamics", ["q", "qd", "qdd", "X"], _inverse_dynamics, "GAM")
-inertia_matrix = _modelled("inertia_matrix", ["q", "X"], _inertia_matrix, "A")
-bias = _modelled("bias", ["q", "qd", "X"], _bias, "GAM")
-gravity = _modelled("gravity", ["q", "X"], _gravity, "GAM")
-forward_dynamics = _modelled("forward_dynamics", ["q", "qd", "tau", "X"], _forward_dynamics, "qdd")
-frame_poses = _modelled("frame_poses", ["q"], _frame_poses, "T1", "T2", "T3", "T4", "T5", "T6")
+base_parameters = _modelled("base_parameters", ["standard"], _base_parameters, ['standard', 'D3', 'RL4'], "X")
+regressor = _modelled("regressor", ['q', 'qd', 'qdd'], _regressor, ['q', 'qd', 'qdd', 'D3', 'RL4', 'g'], *['D'])
+inverse_dynamics = _modelled("inverse_dynamics", ['q', 'qd', 'qdd', 'X'], _inverse_dynamics, ['q', 'qd', 'qdd', 'X', 'D3', 'RL4', 'g'], *['GAM'])
+inertia_matrix = _modelled("inertia_matrix", ['q', 'X'], _inertia_matrix, ['q', 'X', 'D3', 'RL4'], *['A'])
+bias = _modelled("bias", ['q', 'qd', 'X'], _bias, ['q', 'qd', 'X', 'D3', 'RL4', 'g'], *['GAM'])
+gravity = _modelled("gravity", ['q', 'X'], _gravity, ['q', 'X', 'g'], *['GAM'])
+forward_dynamics = _modelled("forward_dynamics", ['q', 'qd', 'tau', 'X'], _forward_dynamics, ['q', 'qd', 'tau', 'X', 'D3', 'RL4', 'g'], *['qdd'])
+frame_poses = _modelled("frame_poses", ['q'], _frame_poses, ['q', 'D3', 'RL4'], *['T1', 'T2', 'T3', 'T4', 'T5', 'T6'])
 jacobian = jacobian_of(6)
 inverse_dynamics_derivatives = _derivatives("inverse_dynamics_derivatives", ["q", "qd", "qdd", "X"], inverse_dynamics, "GAM")
 forward_dynamics_derivatives = _derivatives("forward_dynamics_derivatives", ["q", "qd", "tau", "X"], forward_dynamics, "qdd")

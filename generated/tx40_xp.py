@@ -1,6 +1,6 @@
 """Stäubli TX40, 6 revolute joints: base parameters, regressor, dynamics on the arrays of any package of the array API.
 
-GENERATED from tx40.yaml, sha256 fb8651f3f1d0, by symgen 0.1.0. Do not edit; symgen generate tx40 --target xp
+GENERATED from tx40.yaml, sha256 fb8651f3f1d0, by symgen 0.2.0. Do not edit; symgen generate tx40 --target xp
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta    r
@@ -40,6 +40,32 @@ Base parameters, 60 of 86; Gautier and Khalil (1990), exact over F_p
         FS4 OFFSET4 XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5 OFFSET5 XY6 XZ6 YZ6 ZZ6 MX6 MY6 Ia6 FV6 FS6 OFFSET6 FVM6 FSM6
 No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
 
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+    th   joint angle with its constant, rad
+    C    cosine of a joint angle or of a sum of angles
+    S    sine of a joint angle or of a sum of angles
+    QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
+    QDP  joint acceleration
+    W    angular velocity of a link, in its frame
+    WP   angular acceleration of a link, in its frame
+    DV   products of angular velocity components W_k W_l
+    DW   differences of their squares
+    U    skew(WP) + skew(W)**2
+    VSP  acceleration of the origin of a frame minus gravity, in the antecedent's frame
+    VP   the same, in the frame itself
+    Z    axis of a joint, in the frame of a later link
+    V    velocity of a frame's origin per unit rate of a joint, in that frame
+    VS   the same, in the antecedent's frame
+    F    force that moves a link
+    N    moment that moves a link, about the origin of its frame
+    E    force transmitted to a link by its antecedent, in its frame
+    NE   moment transmitted to a link by its antecedent, about the origin of its frame
+    FDI  the transmitted force, in the antecedent's frame
+    GAM  joint torque or force
+    DG   contribution of a base parameter to a joint torque
+    R    orientation of a frame in frame 0
+    P    origin of a frame in frame 0
+
 Cost per sample
     regressor         355 multiplications, 263 additions, 6 sin, 6 cos
     inverse_dynamics  261 multiplications, 259 additions, 6 sin, 6 cos
@@ -48,9 +74,10 @@ Cost per sample
     gravity           50 multiplications, 34 additions, 5 sin, 5 cos
     frame_poses       48 multiplications, 20 additions, 6 sin, 6 cos
 
-Arrays      q, qd, qdd, tau (..., n) and X (60,) of one package (NumPy, CuPy, JAX, PyTorch, ...), all float64; results stay on their device.
+Arrays      q, qd, qdd, tau (..., 6) and X (60,) of one package (NumPy, CuPy, JAX, PyTorch, ...), all float64; results stay on their device.
             Functions are pure: jax.jit, jax.vmap, jax.grad, torch.func and torch.compile take them as they are.
             Without a compiler every intermediate array is held: evaluate long records in blocks.
+            rad or m and seconds; constants of the robot by keyword.
 Signals     entry (k, j) of the regressor is c*signals(q, qd, qdd)[s] for each (k, j, s, c) in ENTRIES, and zero where there is none.
 """
 
@@ -143,13 +170,6 @@ VALUES = {
     'ZZ6': 0.00012, 'MX6': 0.000208, 'MY6': -0.000208, 'MZ6': 0.01245, 'M6': 0.21, 'Ia6': 0.014, 'FV6': 0.721,
     'FS6': 1.8, 'OFFSET6': 0.166, 'FVM6': 0.7, 'FSM6': 1.6,
 }
-_PATHS = {
-    1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),))),
-    3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),))),
-    4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),))),
-    5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),))),
-    6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),))),
-}
 SIGNALS = 136
 ENTRIES = (
     (0, 0, 0, 1.0), (1, 0, 1, 1.0), (2, 0, 2, 1.0), (3, 0, 3, 1.0), (4, 0, 4, 1.0), (5, 0, 5, -1.0), (6, 0, 6, -1.0),
@@ -184,11 +204,20 @@ ENTRIES = (
 
 
 def _checked(*arrays):
-    """Raise TypeError unless all arrays belong to one package and hold float64."""
+    """The one package that all arrays belong to; TypeError unless all hold float64."""
     xp = array_namespace(*arrays)
     for x in arrays:
         if x.dtype != xp.float64:
             raise TypeError(f"{x.dtype}; expected float64 (JAX: set jax_enable_x64 before arrays are made)")
+    return xp
+
+
+def _states(*states):
+    """The one package that all states belong to; ValueError unless their last axis is that of the joints."""
+    for x in states:
+        if x.shape[-1:] != (6,):
+            raise ValueError(f"state of shape {x.shape}; expected (..., 6)")
+    return _checked(*states)
 
 
 def _sign(x):
@@ -197,19 +226,18 @@ def _sign(x):
     return xp.where(x > 0.0, 1.0, xp.where(x < 0.0, -1.0, 0.0*x))
 
 
-def base_parameters(standard, *, D3=0.225, RL4=0.225, g=9.81):
+def base_parameters(standard: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
     """X, shape (60,), from the 86 standard parameters: a mapping of names to arrays, or one array in the order of STANDARD_PARAMETERS."""
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     else:
         standard = [standard[k] for k in range(86)]
-    _checked(*standard)
-    xp = array_namespace(*standard)
+    xp = _checked(*standard)
     (
-        XX1, XY1, XZ1, YY1, YZ1, ZZ1, MX1, MY1, MZ1, M1, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2,
-        MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4,
-        XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5,
-        M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, FVM6, FSM6
+        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, _, _, Ia2, FV2,
+        FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4, XY4, XZ4, YY4, YZ4,
+        ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5,
+        OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, FVM6, FSM6
     ) = standard
     ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + D3**2*(M3 + M4 + M5 + M6)
     XX2R = XX2 - YY2 - D3**2*(M3 + M4 + M5 + M6)
@@ -233,17 +261,15 @@ def base_parameters(standard, *, D3=0.225, RL4=0.225, g=9.81):
     ])
 
 
-def signals(q, qd, qdd, *, D3=0.225, RL4=0.225, g=9.81):
+def signals(q: "Array", qd: "Array", qdd: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
     """The 136 distinct signals of the regressor, shape (136, ...): all that filters and decimation of its columns need."""
-    _checked(q, qd, qdd)
-    xp = array_namespace(q, qd, qdd)
+    xp = _states(q, qd, qdd)
     return xp.stack(_signals_block(q, qd, qdd, D3, RL4, g), axis=0)
 
 
 def _store(q, qd, qdd, D3, RL4, g):
     """Entries (b, n), row by row, shape (360, ...)."""
-    _checked(q, qd, qdd)
-    xp = array_namespace(q, qd, qdd)
+    xp = _states(q, qd, qdd)
     found = _signals_block(q, qd, qdd, D3, RL4, g)
     rows = [xp.zeros_like(q[..., 0])] * 360
     for k, j, s, c in ENTRIES:
@@ -251,71 +277,76 @@ def _store(q, qd, qdd, D3, RL4, g):
     return xp.stack(rows, axis=0)
 
 
-def regressor(q, qd, qdd, *, D3=0.225, RL4=0.225, g=9.81):
-    """D of Gamma = D X, shape (..., 6, 60); q, qd, qdd of shape (..., 6), rad or m and seconds."""
+def regressor(q: "Array", qd: "Array", qdd: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
+    """D of Gamma = D X. Shape (..., 6, 60)."""
     S = _store(q, qd, qdd, D3, RL4, g)
     xp = array_namespace(S)
     return xp.moveaxis(xp.reshape(S, (60, 6, *q.shape[:-1])), (1, 0), (-2, -1))
 
 
-def observation_matrix(q, qd, qdd, *, D3=0.225, RL4=0.225, g=9.81):
+def observation_matrix(
+    q: "Array", qd: "Array", qdd: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
+) -> "Array":
     """W of Y = W X + rho, shape (6*N, 60), rows joint-major."""
     S = _store(q, qd, qdd, D3, RL4, g)
     xp = array_namespace(S)
     return xp.permute_dims(xp.reshape(S, (60, -1)), (1, 0))
 
 
-def inverse_dynamics(q, qd, qdd, X, *, D3=0.225, RL4=0.225, g=9.81):
-    """Joint torques Gamma, shape (..., 6), of base parameters X, shape (60,)."""
-    _checked(q, qd, qdd, X)
-    xp = array_namespace(q, qd, qdd, X)
-    return xp.stack(_inverse_dynamics_block(q, qd, qdd, X, D3, RL4, g), axis=-1)
-
-
-def inertia_matrix(q, X, *, D3=0.225, RL4=0.225, g=9.81):
-    """A(q), shape (..., 6, 6), actuators included."""
+def inverse_dynamics(
+    q: "Array", qd: "Array", qdd: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
+) -> "Array":
+    """Joint torques Gamma. Shape (..., 6)."""
+    xp = _states(q, qd, qdd)
     _checked(q, X)
-    xp = array_namespace(q, X)
-    return xp.reshape(xp.stack(_inertia_matrix_block(q, X, D3, RL4, g), axis=-1), (*q.shape, 6))
+    return xp.reshape(xp.stack(_inverse_dynamics_block(q, qd, qdd, X, D3, RL4, g), axis=-1), (*q.shape[:-1], 6))
 
 
-def bias(q, qd, X, *, D3=0.225, RL4=0.225, g=9.81):
-    """Gamma at qdd = 0, shape (..., 6): Coriolis, centrifugal, gravity, friction and offset."""
-    _checked(q, qd, X)
-    xp = array_namespace(q, qd, X)
-    return xp.stack(_bias_block(q, qd, X, D3, RL4, g), axis=-1)
-
-
-def gravity(q, X, *, D3=0.225, RL4=0.225, g=9.81):
-    """Gamma at rest without friction, shape (..., 6): gravity, offset and springs (a base parameter may mix them)."""
+def inertia_matrix(q: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (..., 6, 6)."""
+    xp = _states(q)
     _checked(q, X)
-    xp = array_namespace(q, X)
-    return xp.stack(_gravity_block(q, X, D3, RL4, g), axis=-1)
+    return xp.reshape(xp.stack(_inertia_matrix_block(q, X, D3, RL4), axis=-1), (*q.shape[:-1], 6, 6))
 
 
-def forward_dynamics(q, qd, tau, X, *, D3=0.225, RL4=0.225, g=9.81):
-    """qdd = A(q)**-1 (tau - bias), shape (..., 6)."""
-    _checked(q, qd, tau, X)
-    xp = array_namespace(q, qd, tau, X)
-    A, H = inertia_matrix(q, X, D3=D3, RL4=RL4, g=g), bias(q, qd, X, D3=D3, RL4=RL4, g=g)
+def bias(q: "Array", qd: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (..., 6)."""
+    xp = _states(q, qd)
+    _checked(q, X)
+    return xp.reshape(xp.stack(_bias_block(q, qd, X, D3, RL4, g), axis=-1), (*q.shape[:-1], 6))
+
+
+def gravity(q: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (..., 6)."""
+    xp = _states(q)
+    _checked(q, X)
+    return xp.reshape(xp.stack(_gravity_block(q, X, g), axis=-1), (*q.shape[:-1], 6))
+
+
+def frame_poses(q: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
+    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (..., 6, 4, 4)."""
+    xp = _states(q)
+    return xp.reshape(xp.stack(_frame_poses_block(q, D3, RL4), axis=-1), (*q.shape[:-1], 6, 4, 4))
+
+
+def forward_dynamics(
+    q: "Array", qd: "Array", tau: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
+) -> "Array":
+    """qdd = A(q)**-1 (tau - bias). Shape (..., 6)."""
+    xp = _states(q, qd, tau)
+    A, H = inertia_matrix(q, X, D3=D3, RL4=RL4), bias(q, qd, X, D3=D3, RL4=RL4, g=g)
     return xp.linalg.solve(A, (tau - H)[..., None])[..., 0]
 
 
-def frame_poses(q, *, D3=0.225, RL4=0.225, g=9.81):
-    """Homogeneous transform of every frame j in frame 0, shape (..., 6, 4, 4), at index j - 1."""
-    _checked(q)
-    xp = array_namespace(q)
-    return xp.reshape(xp.stack(_frame_poses_block(q, D3, RL4, g), axis=-1), (*q.shape[:-1], 6, 4, 4))
-
-
-def jacobian(q, *, frame=6, D3=0.225, RL4=0.225, g=9.81):
-    """J, shape (..., 6, 6): velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0."""
-    T = frame_poses(q, D3=D3, RL4=RL4, g=g)
+def jacobian(q: "Array", *, frame: int | None = None, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (..., 6, 6)."""
+    T = frame_poses(q, D3=D3, RL4=RL4)
     xp = array_namespace(T)
     still = xp.zeros_like(T[..., 0, :3, 2])
     linear, angular = [still] * 6, [still] * 6
-    P = T[..., (6 if frame is None else frame) - 1, :3, 3]
-    for j, sigma, rates in _PATHS[6 if frame is None else frame]:
+    last = 6 if frame is None else frame
+    P = T[..., last - 1, :3, 3]
+    for j, sigma, rates in _paths()[last]:
         z = T[..., j - 1, :3, 2]
         v, w = (z, still) if sigma else (xp.linalg.cross(z, P - T[..., j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -323,8 +354,19 @@ def jacobian(q, *, frame=6, D3=0.225, RL4=0.225, g=9.81):
     return xp.concat([xp.stack(linear, axis=-1), xp.stack(angular, axis=-1)], axis=-2)
 
 
+def _paths():
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    return {
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
+        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)),),
+        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),)),),
+    }
+
+
 def _signals_block(q, qd, qdd, D3, RL4, g):
-    """The distinct signals of the regressor, (...) each."""
+    """The distinct signals of the regressor; a tuple of its entries, row by row."""
     xp = array_namespace(q)
     # Inputs
     zero = xp.zeros_like(q[..., 0])
@@ -362,12 +404,12 @@ def _signals_block(q, qd, qdd, D3, RL4, g):
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
-    U232 = S2*QDP1
-    U132 = -C2*QDP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV232 = QP2*W22
-    WP12 = DV232 - U232
+    WP12 = DV232 - S2QDP1
     DV132 = QP2*W12
-    WP22 = U132 - DV132
+    WP22 = -C2QDP1 - DV132
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -387,12 +429,12 @@ def _signals_block(q, qd, qdd, D3, RL4, g):
     WP33 = QDP2 + QDP3
     W13 = -S23*QP1
     W23 = -C23*QP1
-    U233 = S23*QDP1
-    U133 = -C23*QDP1
+    S23QDP1 = S23*QDP1
+    C23QDP1 = C23*QDP1
     DV233 = W33*W23
-    WP13 = DV233 - U233
+    WP13 = DV233 - S23QDP1
     DV133 = W33*W13
-    WP23 = U133 - DV133
+    WP23 = -C23QDP1 - DV133
     DV113 = W13**2
     DV123 = W13*W23
     DV223 = W23**2
@@ -534,36 +576,20 @@ def _signals_block(q, qd, qdd, D3, RL4, g):
     # Contributions that several joints share
     DV134Z241 = DV134*Z241
     C4DV134 = C4*DV134
-    DN2XX4 = S4*WP14 + C4DV134
-    DN2XY4 = C4*U324 - S4*U314
-    DN2XZ4 = S4*U214 + C4*DW314
-    DN2YZ4 = S4*DW234 - C4*U124
-    DN2ZZ4 = S4*DV234 - C4DV134
     DN2MX4 = C4*VSP24
     DN2MY4 = -S4*VSP24
     DV135Z251 = DV135*Z251
     DV135Z252 = DV135*Z252
-    DN2XX5 = WP15*Z152 + DV135Z252 - C4*DV125
     C5DV135 = C5*DV135
-    DN2XY5 = U325*Z252 + C4*DW125 - U315*Z152
-    DN2XZ5 = U215*Z152 + DW315*Z252 - C4*U235
-    DN2YZ5 = DW235*Z152 + C4*U135 - U125*Z252
-    DN2ZZ5 = DV235*Z152 + C4*WP35 - DV135Z252
     DN2MX5 = C4*VP25 - VP24*Z252
     DN2MY5 = VP24*Z152 - C4*VP15
     DV136Z261 = DV136*Z261
     DV136Z262 = DV136*Z262
-    DN2XX6 = WP16*Z162 + DV136Z262 + DV126*Z252
     DV136Z264 = DV136*Z264
     C6DV136 = C6*DV136
-    DN2XY6 = U326*Z262 - U316*Z162 - DW126*Z252
-    DN2XZ6 = U216*Z162 + DW316*Z262 + U236*Z252
-    DN2YZ6 = DW236*Z162 - U126*Z262 - U136*Z252
-    DN2ZZ6 = DV236*Z162 - DV136Z262 - WP36*Z252
     DN2MX6 = VP25*Z262 - VP26*Z252
     DN2MY6 = VP16*Z252 - VP25*Z162
-    QP56 = QP5 + QP6
-    signQP56 = _sign(QP56)
+    QPFSM6 = QP5 + QP6
     # Results
     return (
         QDP1,                                                       # 0: DG1ZZ1
@@ -603,8 +629,8 @@ def _signals_block(q, qd, qdd, D3, RL4, g):
         VP25*Z161 + U326*V251 - VP16*Z251 - U126*V161 - U226*V261,  # 34: DG1MY6, sign apart
         DV122,                                                      # 35: DG2XX2, sign apart
         DW122,                                                      # 36: DG2XY2
-        U232,                                                       # 37: DG2XZ2, sign apart
-        -U132,                                                      # 38: DG2YZ2, sign apart
+        S2QDP1,                                                     # 37: DG2XZ2, sign apart
+        C2QDP1,                                                     # 38: DG2YZ2, sign apart
         QDP2,                                                       # 39: DG2ZZ2
         -VP22,                                                      # 40: DG2MX2, sign apart
         -VP12,                                                      # 41: DG2MY2
@@ -612,30 +638,30 @@ def _signals_block(q, qd, qdd, D3, RL4, g):
         _sign(QP2),                                                 # 43: DG2FS2
         DV123,                                                      # 44: DG2XX3, sign apart
         DW123,                                                      # 45: DG2XY3
-        U233,                                                       # 46: DG2XZ3, sign apart
-        -U133,                                                      # 47: DG2YZ3, sign apart
+        S23QDP1,                                                    # 46: DG2XZ3, sign apart
+        C23QDP1,                                                    # 47: DG2YZ3, sign apart
         WP33,                                                       # 48: DG2ZZ3
         -VP23 - U113*V132 - U213*V232,                              # 49: DG2MX3, sign apart
         U123*V132 + U223*V232 - VP13,                               # 50: DG2MY3
-        -DN2XX4,                                                    # 51: DG2XX4, sign apart
-        DN2XY4,                                                     # 52: DG2XY4
-        DN2XZ4,                                                     # 53: DG2XZ4
-        DN2YZ4,                                                     # 54: DG2YZ4
-        DN2ZZ4,                                                     # 55: DG2ZZ4
+        -S4*WP14 - C4DV134,                                         # 51: DG2XX4, sign apart
+        C4*U324 - S4*U314,                                          # 52: DG2XY4
+        S4*U214 + C4*DW314,                                         # 53: DG2XZ4
+        S4*DW234 - C4*U124,                                         # 54: DG2YZ4
+        S4*DV234 - C4DV134,                                         # 55: DG2ZZ4
         U314*V232 - DN2MX4 - U114*V142 - U214*V242,                 # 56: DG2MX4, sign apart
         DN2MY4 + U124*V142 + U224*V242 - U324*V232,                 # 57: DG2MY4
-        -DN2XX5,                                                    # 58: DG2XX5, sign apart
-        -DN2XY5,                                                    # 59: DG2XY5, sign apart
-        DN2XZ5,                                                     # 60: DG2XZ5
-        DN2YZ5,                                                     # 61: DG2YZ5
-        -DN2ZZ5,                                                    # 62: DG2ZZ5, sign apart
+        C4*DV125 - WP15*Z152 - DV135Z252,                           # 58: DG2XX5, sign apart
+        U315*Z152 - U325*Z252 - C4*DW125,                           # 59: DG2XY5, sign apart
+        U215*Z152 + DW315*Z252 - C4*U235,                           # 60: DG2XZ5
+        DW235*Z152 + C4*U135 - U125*Z252,                           # 61: DG2YZ5
+        DV135Z252 - DV235*Z152 - C4*WP35,                           # 62: DG2ZZ5, sign apart
         -DN2MX5 - U115*V152 - U215*V252 - U315*V242,                # 63: DG2MX5, sign apart
         -DN2MY5 - U125*V152 - U225*V252 - U325*V242,                # 64: DG2MY5, sign apart
-        -DN2XX6,                                                    # 65: DG2XX6, sign apart
-        DN2XY6,                                                     # 66: DG2XY6
-        DN2XZ6,                                                     # 67: DG2XZ6
-        DN2YZ6,                                                     # 68: DG2YZ6
-        DN2ZZ6,                                                     # 69: DG2ZZ6
+        -WP16*Z162 - DV136Z262 - DV126*Z252,                        # 65: DG2XX6, sign apart
+        U326*Z262 - U316*Z162 - DW126*Z252,                         # 66: DG2XY6
+        U216*Z162 + DW316*Z262 + U236*Z252,                         # 67: DG2XZ6
+        DW236*Z162 - U126*Z262 - U136*Z252,                         # 68: DG2YZ6
+        DV236*Z162 - DV136Z262 - WP36*Z252,                         # 69: DG2ZZ6
         U316*V252 - DN2MX6 - U116*V162 - U216*V262,                 # 70: DG2MX6, sign apart
         DN2MY6 + U126*V162 + U226*V262 - U326*V252,                 # 71: DG2MY6
         -VP23,                                                      # 72: DG3MX3, sign apart
@@ -692,7 +718,7 @@ def _signals_block(q, qd, qdd, D3, RL4, g):
         -S6*VP25,                                                   # 123: DG5MY6
         QDP6,                                                       # 124: DG5Ia6
         QP6,                                                        # 125: DG5FVM6
-        signQP56,                                                   # 126: DG5FSM6
+        _sign(QPFSM6),                                              # 126: DG5FSM6
         -DV126,                                                     # 127: DG6XX6
         DW126,                                                      # 128: DG6XY6
         U236,                                                       # 129: DG6XZ6, sign apart
@@ -706,7 +732,7 @@ def _signals_block(q, qd, qdd, D3, RL4, g):
 
 
 def _inverse_dynamics_block(q, qd, qdd, X, D3, RL4, g):
-    """Gamma of each joint."""
+    """Joint torques Gamma; a tuple of its entries, row by row."""
     xp = array_namespace(q)
     # Inputs
     q2 = q[..., 1]
@@ -997,21 +1023,21 @@ def _inverse_dynamics_block(q, qd, qdd, X, D3, RL4, g):
     N31 = ZZ1R*QDP1
     NE31 = N31 - S2*NE12 - C2*NE22
     # Friction, actuators
-    QP56 = QP5 + QP6
-    FSM6signQP56 = FSM6*_sign(QP56)
+    QPFSM6 = QP5 + QP6
+    FSM6signQPFSM6 = FSM6*_sign(QPFSM6)
     # Results
     return (
         OFFSET1 + NE31 + FV1*QP1 + FS1*_sign(QP1),
         OFFSET2 + NE32 + FV2*QP2 + FS2*_sign(QP2),
         OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*_sign(QP3),
         OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*_sign(QP4),
-        OFFSET5 + NE35 + Ia5*QDP5 + Ia6*QDP6 + FV5*QP5 + FS5*_sign(QP5) + FVM6*QP6 + FSM6signQP56,
-        OFFSET6 + N36 + Ia6*(QDP5 + QDP6) + FV6*QP6 + FS6*_sign(QP6) + FVM6*QP5 + FSM6signQP56,
+        OFFSET5 + NE35 + Ia5*QDP5 + Ia6*QDP6 + FV5*QP5 + FS5*_sign(QP5) + FVM6*QP6 + FSM6signQPFSM6,
+        OFFSET6 + N36 + Ia6*(QDP5 + QDP6) + FV6*QP6 + FS6*_sign(QP6) + FVM6*QP5 + FSM6signQPFSM6,
     )
 
 
-def _inertia_matrix_block(q, X, D3, RL4, g):
-    """A, row by row: column i is Gamma for a unit acceleration of joint i from rest."""
+def _inertia_matrix_block(q, X, D3, RL4):
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest; a tuple of its entries, row by row."""
     xp = array_namespace(q)
     # Inputs
     zero = xp.zeros_like(q[..., 0])
@@ -1169,12 +1195,12 @@ def _inertia_matrix_block(q, X, D3, RL4, g):
     F162 = MY6*WP252
     F262 = -MX6*WP252
     F362 = MY6*WP162 - MX6*WP262
-    XX6RWP162pXZ6WP252pXY6WP262 = XX6R*WP162 + XY6*WP262 - XZ6*WP252
-    XY6WP162pYZ6WP252 = XY6*WP162 - YZ6*WP252
-    ZZ6WP252pYZ6WP262pXZ6WP162 = YZ6*WP262 + XZ6*WP162 - ZZ6*WP252
-    N162 = XX6RWP162pXZ6WP252pXY6WP262 - MY6*VP252
-    N262 = XY6WP162pYZ6WP252 + MX6*VP252
-    N362 = ZZ6WP252pYZ6WP262pXZ6WP162 + MX6*VP262 - MY6*VP162
+    XX6RWP162pXY6WP262mXZ6WP252 = XX6R*WP162 + XY6*WP262 - XZ6*WP252
+    XY6WP162mYZ6WP252 = XY6*WP162 - YZ6*WP252
+    YZ6WP262pXZ6WP162mZZ6WP252 = YZ6*WP262 + XZ6*WP162 - ZZ6*WP252
+    N162 = XX6RWP162pXY6WP262mXZ6WP252 - MY6*VP252
+    N262 = XY6WP162mYZ6WP252 + MX6*VP252
+    N362 = YZ6WP262pXZ6WP162mZZ6WP252 + MX6*VP262 - MY6*VP162
     FDI162 = C6*F162 - S6*F262
     FDI362 = S6*F162 + C6*F262
     # Joint 5
@@ -1184,12 +1210,12 @@ def _inertia_matrix_block(q, X, D3, RL4, g):
     E152 = FDI162 + F152
     E252 = F252 - F362
     E352 = FDI362 + F352
-    XX5RWP152pXZ5C4mXY5WP252 = XX5R*WP152 + XZ5*C4 + XY5*WP252
+    XX5RWP152pXZ5C4pXY5WP252 = XX5R*WP152 + XZ5*C4 + XY5*WP252
     XY5WP152pYZ5C4 = XY5*WP152 + YZ5*C4
-    ZZ5RC4mYZ5WP252pXZ5WP152 = ZZ5R*C4 + YZ5*WP252 + XZ5*WP152
-    N152 = XX5RWP152pXZ5C4mXY5WP252 + MY5R*VP242
+    ZZ5RC4pYZ5WP252pXZ5WP152 = ZZ5R*C4 + YZ5*WP252 + XZ5*WP152
+    N152 = XX5RWP152pXZ5C4pXY5WP252 + MY5R*VP242
     N252 = XY5WP152pYZ5C4 - MX5*VP242
-    N352 = ZZ5RC4mYZ5WP252pXZ5WP152 + MX5*VP252 - MY5R*VP152
+    N352 = ZZ5RC4pYZ5WP252pXZ5WP152 + MX5*VP252 - MY5R*VP152
     NE152 = C6*N162 + N152 - S6*N262
     NE252 = N252 - N362
     NE352 = S6*N162 + C6*N262 + N352
@@ -1227,13 +1253,13 @@ def _inertia_matrix_block(q, X, D3, RL4, g):
     VP163 = C6*VP153 + S6*VP243
     VP263 = C6*VP243 - S6*VP153
     # Joint 6
-    N163 = XX6RWP162pXZ6WP252pXY6WP262 - MY6*VP253
-    N263 = XY6WP162pYZ6WP252 + MX6*VP253
-    N363 = ZZ6WP252pYZ6WP262pXZ6WP162 + MX6*VP263 - MY6*VP163
+    N163 = XX6RWP162pXY6WP262mXZ6WP252 - MY6*VP253
+    N263 = XY6WP162mYZ6WP252 + MX6*VP253
+    N363 = YZ6WP262pXZ6WP162mZZ6WP252 + MX6*VP263 - MY6*VP163
     # Joint 5
-    N153 = XX5RWP152pXZ5C4mXY5WP252 + MY5R*VP243
+    N153 = XX5RWP152pXZ5C4pXY5WP252 + MY5R*VP243
     N253 = XY5WP152pYZ5C4 - MX5*VP243
-    N353 = ZZ5RC4mYZ5WP252pXZ5WP152 + MX5*VP253 - MY5R*VP153
+    N353 = ZZ5RC4pYZ5WP252pXZ5WP152 + MX5*VP253 - MY5R*VP153
     NE153 = C6*N163 + N153 - S6*N263
     NE253 = N253 - N363
     NE353 = S6*N163 + C6*N263 + N353
@@ -1308,7 +1334,7 @@ def _inertia_matrix_block(q, X, D3, RL4, g):
 
 
 def _bias_block(q, qd, X, D3, RL4, g):
-    """Gamma of each joint at qdd = 0."""
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset; a tuple of its entries, row by row."""
     xp = array_namespace(q)
     # Inputs
     q2 = q[..., 1]
@@ -1570,21 +1596,21 @@ def _bias_block(q, qd, X, D3, RL4, g):
     NE32 = NE33 + D3*FDI23 + N32
     NE31 = -S2*NE12 - C2*NE22
     # Friction, actuators
-    QP56 = QP5 + QP6
-    FSM6signQP56 = FSM6*_sign(QP56)
+    QPFSM6 = QP5 + QP6
+    FSM6signQPFSM6 = FSM6*_sign(QPFSM6)
     # Results
     return (
         OFFSET1 + NE31 + FV1*QP1 + FS1*_sign(QP1),
         OFFSET2 + NE32 + FV2*QP2 + FS2*_sign(QP2),
         OFFSET3 + NE33 + FV3*QP3 + FS3*_sign(QP3),
         OFFSET4 + NE34 + FV4*QP4 + FS4*_sign(QP4),
-        OFFSET5 + NE35 + FV5*QP5 + FS5*_sign(QP5) + FVM6*QP6 + FSM6signQP56,
-        OFFSET6 + N36 + FV6*QP6 + FS6*_sign(QP6) + FVM6*QP5 + FSM6signQP56,
+        OFFSET5 + NE35 + FV5*QP5 + FS5*_sign(QP5) + FVM6*QP6 + FSM6signQPFSM6,
+        OFFSET6 + N36 + FV6*QP6 + FS6*_sign(QP6) + FVM6*QP5 + FSM6signQPFSM6,
     )
 
 
-def _gravity_block(q, X, D3, RL4, g):
-    """Gamma of each joint at rest without friction."""
+def _gravity_block(q, X, g):
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them); a tuple of its entries, row by row."""
     xp = array_namespace(q)
     # Inputs
     q2 = q[..., 1]
@@ -1673,8 +1699,8 @@ def _gravity_block(q, X, D3, RL4, g):
     )
 
 
-def _frame_poses_block(q, D3, RL4, g):
-    """The transforms of all frames, row by row."""
+def _frame_poses_block(q, D3, RL4):
+    """Homogeneous transform of every frame j in frame 0, at index j - 1; a tuple of its entries, row by row."""
     xp = array_namespace(q)
     # Inputs
     zero = xp.zeros_like(q[..., 0])

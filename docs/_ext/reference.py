@@ -1,4 +1,4 @@
-"""Reference pages as Markdown, from the program: commands from the command line, formats from their schemas, modules from their packages."""
+"""Reference pages as Markdown, from the program: commands from the command line, formats from their schemas, robots and examples from their files."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
-from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+import docstrings
 from typer.main import get_command
 
 from runtime.settings.study import Study, to_mapping
@@ -23,7 +22,6 @@ from symgen.description.schema import json_schema
 from symgen.regroup.regrouping import Regrouping, regroup
 
 HERE = Path(__file__).resolve().parent.parent
-HOMES = {"regroup": "symgen.regroup.regrouping"}  # a package has this public name, too
 
 
 def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
@@ -147,23 +145,28 @@ def classes(hint: Any) -> Iterator[type]:
 
 
 def prose(cls: type) -> str:
-    """The docstring of a settings class: its first lines as text, its entries as a list."""
-    from plain_docstrings import ENTRY, entries, paragraphs
-
-    parts = []
-    for part in paragraphs(inspect.getdoc(cls).splitlines() if cls.__doc__ else []):
-        found = entries(part) if ENTRY.match(part[0]) else None
-        parts.append("\n".join(line.replace("``", "`").replace("`\\ ", "`") for line in found) if found else "\n".join(map(verbatim, part)))
-    return "\n\n".join(parts)
-
-
-def verbatim(line: str) -> str:
-    return line.replace("*", "\\*").replace("<", "&lt;")
+    """The docstring of a settings class but its attributes, which stand in the table of its keys."""
+    return "\n\n".join(
+        docstrings.paragraph(part)
+        for part in docstrings.paragraphs(docstrings.sections(inspect.cleandoc(cls.__doc__ or "").splitlines())[0][1])
+    )
 
 
 def keys(cls: Any) -> str:
-    hints = get_type_hints(cls)
-    return table(("key", "holds", "default"), [(f"`{f.name}`", words(hints[f.name]), given(f)) for f in fields(cls)])
+    hints, meanings = get_type_hints(cls, include_extras=False), meaning(cls)
+    rows = [(f"`{f.name}`", words(hints[f.name]), given(f), meanings.get(f.name, "")) for f in fields(cls)]
+    return table(("key", "holds", "default", ""), rows)
+
+
+def meaning(cls: type) -> dict[str, str]:
+    """{key: what its docstring says, with shape and unit} of a settings class."""
+    found = {}
+    for title, lines in docstrings.sections(inspect.cleandoc(cls.__doc__ or "").splitlines()):
+        for names, kind, said in docstrings.entries(lines) if title == "Attributes" else ():
+            unit = ", ".join(part for part in kind.split(", ")[1:] if not part.startswith(("tuple", "or ", "list")))
+            for name in names.split(", "):
+                found[name] = docstrings.text(said + (f" ({unit})" if unit else ""))
+    return found
 
 
 def words(hint: Any) -> str:
@@ -193,39 +196,6 @@ def given(field: Field[Any]) -> str:
     return code(list(value) if isinstance(value, tuple) else value) or "`null`"
 
 
-# Modules
-
-
-def modules(package: str, *left_out: str) -> str:
-    """A package and its public modules but those of `left_out`, with all their public functions and classes."""
-    inner = [m.name for m in iter_modules(import_module(package).__path__) if not (m.ispkg or m.name.startswith("_"))]
-    own = [f".. autofunction:: {package}.{f.__name__}" for f in defined(package)]
-    parts = [rst(package, f".. automodule:: {package}", *own)]
-    parts += [rst(f"{package}.{m}", f".. automodule:: {package}.{m}\n   :members:\n   :undoc-members:") for m in inner if m not in left_out]
-    return "\n".join(parts)
-
-
-def defined(package: str) -> list[Any]:
-    """Public functions written in the __init__.py of a package."""
-    found = inspect.getmembers(import_module(package), inspect.isfunction)
-    return [f for name, f in found if f.__module__ == package and not name.startswith("_")]
-
-
-def rst(title: str, *lines: str) -> str:
-    return "\n".join([f"## {title}", "", "```{eval-rst}", "\n\n".join(lines), "```", ""])
-
-
-def names(package: str) -> str:
-    """The names a package offers, each with its first line and a link to where it is described."""
-    parent = import_module(package)
-    rows = []
-    for name in parent.__all__:
-        thing = getattr(import_module(HOMES.get(name, package)), name)
-        first = (inspect.getdoc(thing) or "").split("\n")[0]
-        rows.append((f"[](#{thing.__module__}.{name})", verbatim(first)))
-    return table(("name", ""), rows)
-
-
 # Robots and examples
 
 
@@ -247,10 +217,10 @@ def robot(name: str) -> str:
     formulas = "\n".join(f"{b.name} = {b.formula}" for b in gathered[:3])
     return "\n".join(
         [
-            f"## {name}", "", f"{verbatim(description.title or name)}. Actuated joints: {len(description.joints)}; frames: {len(description.frames)}; "
+            f"## {name}", "", f"{docstrings.text(description.title or name)}. Actuated joints: {len(description.joints)}; frames: {len(description.frames)}; "
             f"{len(regrouping)} base parameters of {len(description.parameters)}.", "",
             f'<p><a href="../robots/{name}.html">{name}: skeleton, frames, formulas</a></p>', "",
-            f"```text\n{formulas}\n```" if formulas else "", "", verbatim(" ".join((description.source or "").split())), "",
+            f"```text\n{formulas}\n```" if formulas else "", "", docstrings.text(" ".join((description.source or "").split())), "",
         ]
     )  # fmt: skip
 

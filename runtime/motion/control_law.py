@@ -28,9 +28,28 @@ VECTORS = ("P", "Vr", "Vm", "K", "Ie", "Ir", "Im", "antiwindup", "saturation", "
 
 @dataclass(frozen=True, eq=False)
 class ControlLaw:
-    """The numbers of a closed loop of n joints, each of shape (n,), SI, joint side.
+    """The numbers of a closed loop of n joints, SI, joint side.
 
-    encoder_step, encoder_noise : on the side of R, rad or m.   R, offset : the encoder shows R (q - offset).   ca : gain of qdd_r.
+    Attributes
+    ----------
+    P, Vr, Vm, K, Ie, Ir, Im : ndarray, shape (n,)
+        Gains of the head of this module.
+    antiwindup, saturation : ndarray, shape (n,)
+        Largest |I|, and largest |u| before g.
+    torque_step : ndarray, shape (n,), N m or N
+        Step of the converter.
+    encoder_step, encoder_noise : ndarray, shape (n,), rad or m
+        Step and deviation of the noise, on the side of R.
+    ca : ndarray, shape (n,)
+        Gain of qdd_r.
+    rate : float, Hz
+    delay : int
+        Ticks from the position to its torque, 0 or 1.
+    averaged : bool
+        Whether the velocity is the mean difference over two ticks.
+    R, offset : ndarray, shape (n, n) and (n,)
+        The encoder shows R (q - offset).
+    joints : int
     """
 
     P: Array
@@ -63,7 +82,7 @@ class ControlLaw:
             vectors |= {"encoder_step": np.zeros(self.joints), "torque_step": np.zeros(self.joints)}
         return np.column_stack([*(vectors[name] for name in VECTORS), self.R, np.linalg.inv(self.R), self.offset])
 
-    def seen(self, q: Array) -> Array:
+    def shown(self, q: Array) -> Array:
         """What the encoders show of joint positions q (n,)."""
         step = np.where(self.encoder_step > 0, self.encoder_step, 1.0)
         qm = self.R @ (q - self.offset)
@@ -142,8 +161,8 @@ def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
     following = np.vstack(
         [np.hstack([Phi, np.zeros((2 * n, 4 * n))]) + Gamma @ tau, position, np.hstack([zero, zero, one, *[zero] * 3]), integral, u]
     )
-    kept = np.concatenate([np.ones(4 * n, bool), law.K != 0, np.full(n, law.delay == 1)])
-    return np.asarray(np.linalg.eigvals(following[np.ix_(kept, kept)]))
+    acting = np.concatenate([np.ones(4 * n, bool), law.K != 0, np.full(n, law.delay == 1)])
+    return np.asarray(np.linalg.eigvals(following[np.ix_(acting, acting)]))
 
 
 def continuous_pole(law: ControlLaw, A: Array, B: Array, g: Array) -> float:

@@ -3,7 +3,7 @@
     y     = what the encoder shows of q                   qd_m = its difference
     u     = P e + Vr qd_r - Vm qd_m + K I + feed-forward,  e = q_r - y        (both laws of the study file, runtime.motion.control_law)
     tau   = g sat(u), u of this tick or of the one before, in steps of the converter, held until the next tick
-    q, qd = Runge-Kutta of order 4 in equal substeps (or CVODES), cut where a slip stops (simulation_friction)
+    q, qd = Runge-Kutta of order 4 in equal substeps (or CVODES), cut where a slip stops (`runtime.motion.dry_friction`)
 
 State of a tick: q, qd, the two last positions seen, I, and u. What changes from run to run is an input, so that one compilation serves them all.
 """
@@ -23,7 +23,8 @@ import numpy as np
 from runtime.model.casadi import SymbolicModel
 from runtime.model.compile_cache import FallbackWarning, NotCompiledError, cache_folder, shared_object
 from runtime.motion.control_law import VECTORS
-from runtime.motion.dry_friction import REST, DryFriction, event_function, friction_function, rest_function
+from runtime.motion.dry_friction import DryFriction, event_function, friction_function, rest_function
+from runtime.motion.result import REST
 
 Array = np.ndarray
 MX = Any  # casadi.MX
@@ -34,8 +35,27 @@ CVODES = {"abstol": 1e-10, "reltol": 1e-9}
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
-    """A run in numbers: state x (6n,) at the first tick, signals (S + N, 5n) of which the first S only settle, noise of the recorded torque (N, n)."""
+class LoopInputs:
+    """A run in numbers.
+
+    Attributes
+    ----------
+    x : ndarray, shape (6n,)
+        State of the loop at the first tick: q, qd, y1, y2, I, u.
+    signals : ndarray, shape (S + N, 5n)
+        q_r, qd_r, feed-forward, encoder noise, disturbance at every tick; during the first S = `settling` ticks the loop only settles.
+    settling : int
+    X : ndarray, shape (b,)
+        Base parameters.
+    g : ndarray, shape (n,)
+        Factor on everything between position error and torque.
+    law : ndarray, shape (n, columns)
+        Of `ControlLaw.matrix`.
+    substeps : int
+        Integration steps per tick.
+    torque_noise : ndarray, shape (N, n), N m or N
+        Of the recorded torque.
+    """
 
     x: Array
     signals: Array
@@ -48,10 +68,10 @@ class Plan:
 
 
 def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
-    """`size` rows at a time, the last ones filled up with copies of the last, and how many of them count."""
+    """`size` rows at a time and how many of them count; the last block is filled up with copies of its last row."""
     for k in range(0, len(rows), size):
-        found = rows[k : k + size]
-        yield np.vstack([found, np.repeat(found[-1:], size - len(found), axis=0)]), len(found)
+        block = rows[k : k + size]
+        yield np.vstack([block, np.repeat(block[-1:], size - len(block), axis=0)]), len(block)
 
 
 def tick_function(model: SymbolicModel, friction: DryFriction, constants: Mapping[str, float], substeps: int, integrator: str) -> Any:
@@ -150,10 +170,10 @@ def _rounds(model: SymbolicModel, friction: DryFriction, constants: dict[str, fl
 
     # a switch gives only what is used: in C, CasADi crashes on a result of one that nobody takes
     q, qd, *fixed, h = inputs
-    kept, results = list(cut(*inputs)[:4]), [q, qd, h]
-    again = ca.Function.if_else("again", ca.Function("next", inputs, kept[:3]), ca.Function("idle", inputs, results))
+    of_cut, results = list(cut(*inputs)[:4]), [q, qd, h]
+    again = ca.Function.if_else("again", ca.Function("next", inputs, of_cut[:3]), ca.Function("idle", inputs, results))
     final = ca.Function.if_else("final", ca.Function("last", inputs, list(whole(*inputs)[:2])), ca.Function("idle", inputs, results[:2]))
-    q, qd, h, qdd = ca.Function("first", inputs, kept)(*inputs)
+    q, qd, h, qdd = ca.Function("first", inputs, of_cut)(*inputs)
     for _ in range(ROUNDS - 2):
         q, qd, h = again(h > 0, q, qd, *fixed, h)
     q, qd = final(h > 0, q, qd, *fixed, h)
@@ -220,13 +240,13 @@ def compiled(function: Any, cache: Path | None = None) -> Any:
     generator = ca.CodeGenerator(f"{function.name()}.c")
     generator.add(function)
     text = generator.dump().encode()
-    found: list[Path] = []
+    objects: list[Path] = []
 
     def opened(path: Path) -> ctypes.CDLL:
         library = ctypes.CDLL(str(path))
         if not hasattr(library, function.name()):
             raise NotCompiledError(f"no function {function.name()} in {path}")
-        found.append(path)
+        objects.append(path)
         return library
 
     try:
@@ -234,4 +254,4 @@ def compiled(function: Any, cache: Path | None = None) -> Any:
     except (NotCompiledError, OSError) as e:
         warnings.warn(f"simulation: CasADi's own interpreter in place of C: {e}", FallbackWarning, stacklevel=2)
         return function
-    return ca.external(function.name(), str(found[-1]))
+    return ca.external(function.name(), str(objects[-1]))

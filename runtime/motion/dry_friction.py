@@ -19,12 +19,13 @@ import casadi as ca
 import numpy as np
 
 from runtime.model.casadi import SymbolicModel
+from runtime.model.generated import GeneratedModel
+from runtime.motion.result import REST
 
 Array = np.ndarray
 SX = Any  # casadi.SX
 
 DRAWS = 12  # random motions in which the columns of the regressor are looked at
-REST = 1e-9  # rad/s or m/s: slower is at rest
 PIVOTS = 5  # block pivots
 EQUAL = 1e-9  # relative; keeps the forces of redundant elements apart
 SLACK = 1e-6  # of the acceleration that dry friction gives: an element that starts slower may as well rest
@@ -32,7 +33,17 @@ SLACK = 1e-6  # of the acceleration that dry friction gives: an element that sta
 
 @dataclass(frozen=True, eq=False)
 class DryFriction:
-    """Rows of G, shape (m, n); c_plus = plus @ X and c_minus = minus @ X, shape (m, b) each; smooth : columns of X that are not dry friction, (b,)."""
+    """Coulomb elements of a model.
+
+    Attributes
+    ----------
+    G : ndarray, shape (m, n)
+        One row per element: its slip is s = G qd.
+    plus, minus : ndarray, shape (m, b), 0 or 1
+        c_plus = plus @ X and c_minus = minus @ X, the largest forces in each direction.
+    smooth : ndarray, shape (b,), 0 or 1
+        0 for the parameters of dry friction.
+    """
 
     G: Array
     plus: Array
@@ -40,13 +51,13 @@ class DryFriction:
     smooth: Array
 
 
-def dry_friction(model: SymbolicModel) -> DryFriction:
-    """The Coulomb columns of the regressor: of degree zero in qd, zero at rest. They are G' sign(G qd), or one side of it."""
+def dry_friction(model: GeneratedModel) -> DryFriction:
+    """Coulomb columns of the regressor: of degree zero in qd, zero at rest. They are G' sign(G qd), or one side of it."""
     n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
     rng = np.random.default_rng(1)
     q, qd = rng.uniform(0.1, 1.0, (2, n, DRAWS)) * rng.choice([-1, 1], (2, n, DRAWS))
     fast, faster, rest = (
-        model.regressor(q=q, qd=speed, qdd=np.zeros((n, DRAWS)))["D"].full().reshape(n, DRAWS, b) for speed in (qd, 2 * qd, 0 * qd)
+        np.array(model.regressor(q.T, speed.T, np.zeros((DRAWS, n)))).transpose(1, 0, 2) for speed in (qd, 2 * qd, 0 * qd)
     )
     dry = (fast == faster).all(axis=(0, 1)) & (rest == 0).all(axis=(0, 1)) & (fast != 0).any(axis=(0, 1))
     rows: dict[tuple[float, ...], tuple[Array, Array]] = {}

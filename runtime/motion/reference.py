@@ -17,7 +17,7 @@ import numpy as np
 from runtime.errors import InputError, SettingsError
 from runtime.model.generated import GeneratedModel
 from runtime.observation.filters import derivative
-from runtime.records.formats.table import read_table
+from runtime.records.formats.table import open_table
 from runtime.records.record import Record
 from runtime.settings.controller import Controller, Points
 from runtime.settings.trajectories import motion_from_mapping
@@ -100,21 +100,21 @@ def _check_length(duration: float, rate: float, key: str) -> None:
 
 def read_reference(path: Path, rate: float, n: int) -> Reference:
     """Columns q1 ... qn and, where they are there, qd1 ..., qdd1 ... of a file at `rate`, Hz."""
-    table, _ = read_table(path)
+    table = open_table(path)
     names = {x: [f"{x}{j}" for j in range(1, n + 1)] for x in UNITS}
     if missing := [name for name in names["q"] if name not in table.names]:
         raise InputError(f"no column {', '.join(missing)} among {', '.join(table.names)}; expected q1 ... q{n}", file=path.name)
     if "t" in table.names:
-        t = table.stack(["t"])[:, 0]
+        t = table.read([["t"]])[0][:, 0]
         found = (len(t) - 1) / (t[-1] - t[0])
         if abs(found / rate - 1) > RATE_TOLERANCE:
             raise InputError(
                 f"time runs at {found:g} Hz; the controller at {rate:g} Hz: resample one, or set controller.rate", file=path.name
             )
-    plain = Reference.sampled(table.stack(names["q"]), rate)
+    plain = Reference.sampled(table.read([names["q"]])[0], rate)
     if not all(name in table.names for name in (*names["qd"], *names["qdd"])):
         return plain
-    return Reference(rate, plain.q, table.stack(names["qd"]), table.stack(names["qdd"]))
+    return Reference(rate, plain.q, *table.read([names["qd"], names["qdd"]]))
 
 
 def _of_record(records: Sequence[Record], index: int, rate: float) -> Reference:

@@ -19,7 +19,7 @@ import numpy as np
 from runtime.model.casadi import SymbolicModel
 from runtime.motion.controller_tick import (
     ROUNDS,
-    Plan,
+    LoopInputs,
     blocks,
     control_function,
     flow_function,
@@ -28,8 +28,8 @@ from runtime.motion.controller_tick import (
     round_function,
     sliding_friction,
 )
-from runtime.motion.dry_friction import REST, DryFriction, friction_function, rest_function, solve
-from runtime.motion.result import Sensitivity
+from runtime.motion.dry_friction import DryFriction, friction_function, rest_function, solve
+from runtime.motion.result import REST, Sensitivity
 
 Array = np.ndarray
 MX = Any  # casadi.MX
@@ -46,8 +46,8 @@ def tangent_function(model: SymbolicModel, friction: DryFriction, constants: Map
     inputs = [q, ca.vertcat(y1, y2), I, before, ca.vertcat(*wanted), noise, law, flags]
     _, tau, _, _ = control(*inputs)
     dq, dqd, dy1, dy2, dI, dbefore = ca.vertsplit(Xi, n)
-    seen = ca.vertcat(dq, dy1, dy2, dI, dbefore)
-    dtau, dI_next, du = (part @ seen for part in ca.vertsplit(_control_jacobian(n, law_columns)(*inputs), n))
+    dcontrol = ca.vertcat(dq, dy1, dy2, dI, dbefore)
+    dtau, dI_next, du = (part @ dcontrol for part in ca.vertsplit(_control_jacobian(n, law_columns)(*inputs), n))
     step = _plant_tangent(model, friction, dict(constants), integrator)
     plus, minus, smooth = ca.DM(friction.plus) @ X, ca.DM(friction.minus) @ X, X * ca.DM(friction.smooth)
     dq1, dqd1 = dq, dqd
@@ -147,26 +147,26 @@ def _linear_function(model: SymbolicModel, friction: DryFriction, constants: dic
     q, qd, qdd, tau, X = (ca.SX.sym(name, k) for name, k in (("q", n), ("qd", n), ("qdd", n), ("tau", n), ("X", b)))
     Gamma = model.inverse_dynamics(q=q, qd=qd, qdd=qdd, X=X, **constants)["GAM"]
     D = model.regressor(q=q, qd=qd, qdd=qdd, **constants)["D"] @ ca.diag(ca.DM(friction.smooth))
-    found = model.forward_dynamics(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
+    forward = model.forward_dynamics(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
     A = model.inertia_matrix(q=q, X=X, **constants)["A"]
-    parts = ca.substitute([ca.jacobian(Gamma, q), ca.jacobian(Gamma, qd), D], [qdd], [found])
+    parts = ca.substitute([ca.jacobian(Gamma, q), ca.jacobian(Gamma, qd), D], [qdd], [forward])
     inverse = solve(A, ca.SX.eye(n))
-    return ca.Function("linear", [q, qd, tau, X], [found, ca.densify(inverse), *map(ca.densify, parts)])
+    return ca.Function("linear", [q, qd, tau, X], [forward, ca.densify(inverse), *map(ca.densify, parts)])
 
 
-def tangent_along(function: Any, before: Array, plan: Plan, flags: Array, block: int, every: int) -> Sensitivity:
+def tangent_along(function: Any, before: Array, inputs: LoopInputs, flags: Array, block: int, every: int) -> Sensitivity:
     """The tangent system along the states `before` each tick, (S + N, 6n); derivatives at every `every`-th tick after the settling."""
-    n, b = before.shape[1] // 6, len(plan.X)
+    n, b = before.shape[1] // 6, len(inputs.X)
     Xi = np.zeros((6 * n, b))
-    found: list[Array] = []  # dq, dqd, dtau of the ticks that count, (3n, b) each
+    ticks: list[Array] = []  # dq, dqd, dtau of the ticks that count, (3n, b) each
     tick = 0
-    for rows, used in blocks(np.hstack([before, plan.signals]), block):
-        Xi1, dtau = (x.full() for x in function(Xi, rows[:, : 6 * n].T, rows[:, 6 * n :].T, plan.X, plan.law, flags))
+    for rows, used in blocks(np.hstack([before, inputs.signals]), block):
+        Xi1, dtau = (x.full() for x in function(Xi, rows[:, : 6 * n].T, rows[:, 6 * n :].T, inputs.X, inputs.law, flags))
         after, torque = Xi1.reshape(6 * n, block, b), dtau.reshape(n, block, b)
         for k in range(used):
-            if tick >= plan.settling and (tick - plan.settling) % every == 0:
-                found.append(np.vstack([(Xi if k == 0 else after[:, k - 1])[: 2 * n], torque[:, k]]))
+            if tick >= inputs.settling and (tick - inputs.settling) % every == 0:
+                ticks.append(np.vstack([(Xi if k == 0 else after[:, k - 1])[: 2 * n], torque[:, k]]))
             tick += 1
         Xi = after[:, used - 1]
-    q, qd, tau = np.split(np.array(found), 3, axis=1)
+    q, qd, tau = np.split(np.array(ticks), 3, axis=1)
     return Sensitivity(q, qd, tau)

@@ -1,8 +1,8 @@
 """Closed-loop simulation on the emitted CasADi model.
 
-    found = simulate(model, X, controller, reference)              # one run
-    simulator = Simulator(model, controller)                       # many: compiled once
-    found = simulator.run(X, reference, g=g, ideal=True)           # exact states, no noise, no steps
+    run = simulate(model, study)                            # one run, by the section `controller`
+    simulator = Simulator(model, controller)                # many: compiled once
+    run = simulator.run(X, reference, g=g, ideal=True)      # exact states, no noise, no steps
 
 Torque is held between the ticks of the controller; between them Runge-Kutta of order 4 (or CVODES), with dry friction that holds at rest and only
 takes energy. Substeps are at most `pole_step` over the fastest pole of the loop. Before a run the inertia matrix must be positive definite and
@@ -11,7 +11,7 @@ the sampled loop stable along the reference: what is not raises SimulationError,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -24,12 +24,16 @@ from runtime.errors import InputError, SettingsError
 from runtime.model.casadi import SymbolicModel, load_symbolic
 from runtime.model.generated import GeneratedModel
 from runtime.motion.control_law import ControlLaw, continuous_pole, control_law, discrete_poles
-from runtime.motion.controller_tick import Plan, blocks, compiled, tick_function
-from runtime.motion.dry_friction import REST, DryFriction, dry_friction
-from runtime.motion.reference import Reference
-from runtime.motion.result import Sensitivity, Simulation, SimulationError
+from runtime.motion.controller_tick import LoopInputs, blocks, compiled, tick_function
+from runtime.motion.dry_friction import DryFriction, dry_friction
+from runtime.motion.reference import Reference, reference_of
+from runtime.motion.result import REST, Sensitivity, Simulation, SimulationError
 from runtime.motion.sensitivity import tangent_along, tangent_function
+from runtime.records.provenance import SIMULATED
+from runtime.records.reading import read_records
+from runtime.records.record import Record
 from runtime.settings.controller import Controller
+from runtime.settings.study import Study
 
 Array = np.ndarray
 
@@ -60,7 +64,7 @@ class Simulator:
         self.model, self.controller, self.constants = model, controller, dict(constants or {})
         self.law: ControlLaw = control_law(controller, model)
         self.symbolic = symbolic or _beside(model)
-        self.friction: DryFriction = dry_friction(self.symbolic)
+        self.friction: DryFriction = dry_friction(model)
         self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
         self._ticks: dict[int, Any] = {}
         self._blocks: dict[int, Any] = {}
@@ -87,9 +91,9 @@ class Simulator:
         feedforward : torques added to the command, (N, n), in place of those of the settings.   seed : of the noise; default: that of the settings.
         """
         seed = self.controller.seed if seed is None else seed
-        plan = self._plan(X, reference, g, start, disturbance, feedforward, None if ideal else seed)
-        states, out = self._iterated(plan)
-        return self._result(plan, states, out, reference, name)
+        inputs = self._inputs(X, reference, g, start, disturbance, feedforward, None if ideal else seed)
+        states, out = self._iterated(inputs)
+        return self._result(inputs, states, out, reference, ideal=ideal, name=name)
 
     def sensitivity(
         self,
@@ -101,18 +105,20 @@ class Simulator:
         disturbance: Array | None = None,
         feedforward: Array | None = None,
     ) -> tuple[Simulation, Sensitivity]:
-        """An ideal run and its derivatives by X, from the tangent system stepped beside it (`simulation_tangent`)."""
-        plan = self._plan(X, reference, g, start, disturbance, feedforward, None)
-        states, out = self._iterated(plan)
-        found = self._result(plan, states, out, reference, "simulation")
-        if plan.substeps not in self._tangents:
-            tick = tangent_function(self.symbolic, self.friction, self.constants, plan.substeps, self.controller.integrator)
-            self._tangents[plan.substeps] = (compiled(tick) if self._in_c else tick).mapaccum(TANGENT_BLOCK)
-        before = np.vstack([plan.x, states[:-1]])
-        tangent = tangent_along(self._tangents[plan.substeps], before, plan, self.law.flags, TANGENT_BLOCK, self.controller.record_every)
-        return found, tangent
+        """An ideal run and its derivatives by X, from the tangent system stepped beside it (`runtime.motion.sensitivity`)."""
+        inputs = self._inputs(X, reference, g, start, disturbance, feedforward, None)
+        states, out = self._iterated(inputs)
+        run = self._result(inputs, states, out, reference, ideal=True)
+        if inputs.substeps not in self._tangents:
+            tick = tangent_function(self.symbolic, self.friction, self.constants, inputs.substeps, self.controller.integrator)
+            self._tangents[inputs.substeps] = (compiled(tick) if self._in_c else tick).mapaccum(TANGENT_BLOCK)
+        before = np.vstack([inputs.x, states[:-1]])
+        tangent = tangent_along(
+            self._tangents[inputs.substeps], before, inputs, self.law.flags, TANGENT_BLOCK, self.controller.record_every
+        )
+        return run, tangent
 
-    def _plan(
+    def _inputs(
         self,
         X: Array,
         reference: Reference,
@@ -121,7 +127,7 @@ class Simulator:
         disturbance: Array | None,
         feedforward: Array | None,
         seed: int | None,
-    ) -> Plan:
+    ) -> LoopInputs:
         """seed : None for an ideal run."""
         n, N = len(self.model.JOINTS), len(reference)
         X, g = self._parameters(X), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
@@ -133,7 +139,7 @@ class Simulator:
         signals = np.hstack([reference.q, reference.qd, known + self.law.ca * reference.qdd, noise, pushed])
         settling = round(self.controller.settle * self.controller.rate) if self.law.K.any() else 0
         still = np.concatenate([reference.q[0], np.zeros(n), known[0], np.zeros(2 * n)])
-        return Plan(
+        return LoopInputs(
             x=self._start(reference, start, ideal=seed is None),
             signals=np.vstack([np.tile(still, (settling, 1)), signals]),
             settling=settling,
@@ -144,11 +150,11 @@ class Simulator:
             torque_noise=torque_noise,
         )
 
-    def _result(self, plan: Plan, states: Array, out: Array, reference: Reference, name: str) -> Simulation:
+    def _result(self, inputs: LoopInputs, states: Array, out: Array, reference: Reference, **said: Any) -> Simulation:
         n, every = len(self.model.JOINTS), self.controller.record_every
-        _check_motion(states[plan.settling :, :n], reference)
-        before = np.vstack([plan.x, states[:-1]])[plan.settling :]
-        y, tau, qdd = np.split(out[plan.settling :], 3, axis=1)
+        _check_motion(states[inputs.settling :, :n], reference)
+        before = np.vstack([inputs.x, states[:-1]])[inputs.settling :]
+        y, tau, qdd = np.split(out[inputs.settling :], 3, axis=1)
         qd = before[::every, n : 2 * n]
         return Simulation(
             t=reference.t[::every],
@@ -157,13 +163,15 @@ class Simulator:
             qdd=qdd[::every],
             tau=tau[::every],
             q_measured=y[::every],
-            tau_measured=(tau + plan.torque_noise)[::every],
+            tau_measured=(tau + inputs.torque_noise)[::every],
             q_r=reference.q[::every],
             rate=self.controller.rate / every,
-            saturated=(np.abs(tau) >= plan.g * self.law.saturation * (1 - 1e-9)).mean(axis=0),
-            substeps=plan.substeps,
+            saturated=(np.abs(tau) >= inputs.g * self.law.saturation * (1 - 1e-9)).mean(axis=0),
+            substeps=inputs.substeps,
             state=states[-1],
-            name=name,
+            model=self.model,
+            X=inputs.X,
+            **said,
         )
 
     def substeps(self, X: Array, reference: Reference, g: Array) -> int:
@@ -195,21 +203,21 @@ class Simulator:
         return steps
 
     def tick(self, substeps: int) -> Any:
-        """The CasADi function of one tick (`simulation_loop.tick_function`)."""
+        """The CasADi function of one tick (`controller_tick.tick_function`)."""
         if substeps not in self._ticks:
             tick = tick_function(self.symbolic, self.friction, self.constants, substeps, self.controller.integrator)
             self._ticks[substeps] = compiled(tick) if self._in_c else tick
         return self._ticks[substeps]
 
-    def _iterated(self, plan: Plan) -> tuple[Array, Array]:
+    def _iterated(self, inputs: LoopInputs) -> tuple[Array, Array]:
         """BLOCK ticks at a time: states after each tick (S + N, 6n), outputs y, tau, qdd (S + N, 3n)."""
-        if plan.substeps not in self._blocks:
-            self._blocks[plan.substeps] = self.tick(plan.substeps).mapaccum(BLOCK)
-        x, states, out = plan.x, [], []
-        for rows, used in blocks(plan.signals, BLOCK):
-            found = self._blocks[plan.substeps](x, rows.T, plan.X, plan.law, self.law.flags)
-            states.append(found[0].full().T[:used])
-            out.append(found[1].full().T[:used])
+        if inputs.substeps not in self._blocks:
+            self._blocks[inputs.substeps] = self.tick(inputs.substeps).mapaccum(BLOCK)
+        x, states, out = inputs.x, [], []
+        for rows, used in blocks(inputs.signals, BLOCK):
+            after, outputs = self._blocks[inputs.substeps](x, rows.T, inputs.X, inputs.law, self.law.flags)
+            states.append(after.full().T[:used])
+            out.append(outputs.full().T[:used])
             x = states[-1][-1]
         return np.vstack(states), np.vstack(out)
 
@@ -220,7 +228,7 @@ class Simulator:
         q = np.asarray(reference.q[0] if given is None else given, dtype=float)
         if q.shape != (n,) or not np.isfinite(q).all():
             raise InputError(f"start {q}; expected {n} finite joint positions")
-        y = q if ideal else self.law.seen(q)
+        y = q if ideal else self.law.shown(q)
         return np.concatenate([q, np.zeros(n), y, y, np.zeros(2 * n)])
 
     def _feedforward(self, reference: Reference) -> Array:
@@ -252,9 +260,53 @@ class Simulator:
         return X
 
 
-def simulate(model: GeneratedModel, X: Array, controller: Controller, reference: Reference, **settings: Any) -> Simulation:
-    """One run; `settings` as for `Simulator.run`. Many runs of one loop: make a Simulator."""
-    return Simulator(model, controller).run(X, reference, **settings)
+def simulate(
+    model: GeneratedModel,
+    study: Study,
+    *,
+    records: Sequence[Record] | None = None,
+    folder: str | Path | None = None,
+    symbolic: SymbolicModel | None = None,
+    ideal: bool = False,
+    name: str | None = None,
+) -> Simulation:
+    """The closed loop of study.controller along its reference. Many runs of one loop, other parameters: make a `Simulator`.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        With values of its standard parameters, or with all of them in `values` of the controller.
+    study : Study
+        With a section `controller`.
+    records : sequence of Record, optional
+        Those of the study; default: read from its files, where the reference is that of a record.
+    folder : str or Path, optional
+        Where file names of the study start; default: the current folder.
+    symbolic : SymbolicModel, optional
+        CasADi model of the same robot; default: the file beside that of `model`.
+    ideal : bool
+        No noise, no steps of encoder and converter.
+    name : str, optional
+        Of the simulated record; its default says that nothing was measured.
+
+    Raises
+    ------
+    InputError
+        No section `controller`, or a reference outside the limits of the robot.
+    SimulationError
+        An inertia that is not positive definite, or a loop that is not stable.
+    """
+    controller = study.controller
+    if controller is None:
+        raise InputError("the study has no section `controller`; it says law, rate and reference of the closed loop")
+    folder, index = Path(folder or ""), controller.reference.record
+    if records is None:
+        records = read_records(study.record, model, folder=folder) if index is not None else ()
+    X = parameters_of(model, controller)
+    reference = reference_of(controller, model, records=records, folder=folder)
+    start = records[index].q[0] if index is not None and controller.start is None else None
+    simulator = Simulator(model, controller, symbolic=symbolic)
+    return simulator.run(X, reference, ideal=ideal, start=start, name=name or f"{SIMULATED} {model.NAME}")
 
 
 def parameters_of(model: GeneratedModel, controller: Controller) -> Array:

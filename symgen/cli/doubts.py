@@ -1,10 +1,7 @@
-"""Notes on robots that are valid but probably not what was meant: angles a hair off a round one, equal sides of a loop under two names."""
+"""Notes of the verbs on robots that are valid but probably not what was meant."""
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import typer
@@ -12,51 +9,10 @@ import typer
 if TYPE_CHECKING:
     from symgen.description import Robot
 
-CLOSE = 1e-3  # rad: nearer to a round angle than a drawing shows, and not on it
-
 
 def tell_doubts(robot: Robot) -> None:
-    """Print the notes on `robot` on the error stream, before a derivation that they may spare. Raises DescriptionError where a loop does not close."""
-    for sentence in (*nearly_round(robot), *equal_sides(robot)):
+    """Print the notes on `robot` on the error stream, before a derivation that they may spare."""
+    from symgen.derive.doubts import doubts
+
+    for sentence in doubts(robot):
         typer.echo(f"note: {sentence}", err=True)
-
-
-def nearly_round(robot: Robot) -> list[str]:
-    """Angles written as decimals, such as 1.5708: exact arithmetic takes them for oblique ones, with formulas and base parameters of their own."""
-    from symgen.description.expression import PI, twelfths
-
-    found = []
-    for f in robot.frames:
-        for name, angle in (("gamma", f.gamma), ("alpha", f.alpha), ("theta", f.theta0)):
-            if not (value := angle.constant):
-                continue
-            k = twelfths(float(value), CLOSE)
-            if k is not None:
-                meant = PI * Fraction(k, 12)
-                found.append(
-                    f"frame {f.j}: {name} has {angle}, not {meant}: "
-                    f"another robot, with other formulas; write {meant} (of a URDF: symgen convert --snap 1e-4)"
-                )
-    return found
-
-
-def equal_sides(robot: Robot) -> list[str]:
-    """Lengths of equal value and different names in a loop without linear relations: with one name it may be a parallelogram."""
-    if not robot.loops:
-        return []
-    from symgen.derive.loops import close
-
-    tied = set(close(robot).tied)
-    found = []
-    for loop in robot.loops:
-        frames = [robot.frame(j) for j in sorted({*robot.path(loop.cut)} ^ {*robot.path(loop.twin)})]
-        if not tied & {f.j for f in frames}:
-            continue
-        lengths = sorted({name for f in frames for e in (f.b, f.d, f.r) for name in e.symbols if robot.constants.get(name)})
-        pairs = [f"{a} and {b}" for a, b in combinations(lengths, 2) if math.isclose(robot.constants[a], robot.constants[b], rel_tol=1e-9)]
-        if pairs:
-            found.append(
-                f"the loop of frames {loop.cut} and {loop.twin} is taken for a general one, which is slow and has the NumPy target only; "
-                f"{', '.join(pairs)} are equal: if by construction, write one name for both, and a parallelogram is seen as one"
-            )
-    return found

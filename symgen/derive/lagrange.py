@@ -322,8 +322,11 @@ def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, fl
         D = np.concatenate([D, block[closed]])[:states]
         state = np.concatenate([state, np.array([q, qd, qdd])[:, closed]], axis=1)[:, :states]
         if len(D) == states:
-            q, qd, qdd = state
-            return Sample(model, q, qd, qdd, D)
+            return Sample(model, *state, D)
+    if not robot.passive:
+        raise DescriptionError(
+            f"{robot.name}: torques are not finite for the constants {dict(robot.constants)}; check their values", path=("constants",)
+        )
     raise DescriptionError(
         f"{robot.name}: the loops close in {len(D)} of {DRAWS * states} random states near their start; give each loop a `start` that closes it",
         path=("loops",),

@@ -1,16 +1,19 @@
-"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par`, URDF and MJCF, by suffix."""
+"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par`, URDF and MJCF, read and written by suffix."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
 from symgen.description.par import read_par
+from symgen.description.par_write import write_par
 from symgen.description.robot import Robot
 from symgen.description.yaml import parse_robot
+from symgen.description.yaml_write import write_yaml
 from symgen.errors import DescriptionError
 
+WRITTEN = (".yaml", ".yml", ".par", ".urdf")  # suffixes of the formats that are written
 MAX_BYTES = 10_000_000  # no format reads more; each has a limit of its own below
 
 
@@ -59,6 +62,21 @@ def read_robot(
 
         return read_mjcf(content, path.name, keep_fixed=keep_fixed)
     return parse_robot(content, path.name), ()
+
+
+def write_robot(robot: Robot, file: str, *, comments: Sequence[str] = ()) -> tuple[str, tuple[str, ...]]:
+    """Text of `robot` in the format that the suffix of `file` names, and notes on what of it the format does not carry.
+
+    comments : lines at the top of a robot file (.yaml). Raises DescriptionError where the format would hold another mechanism.
+    """
+    suffix = Path(file).suffix.lower()
+    if suffix not in WRITTEN:
+        raise DescriptionError(f"{file}: expected a file name that ends in {', '.join(WRITTEN)}")
+    if suffix == ".urdf":
+        from symgen.description.urdf_write import write_urdf  # numpy, which robot files do without
+
+        return write_urdf(robot)
+    return write_par(robot) if suffix == ".par" else (write_yaml(robot, comments=comments), ())
 
 
 def _read(path: Path) -> bytes:

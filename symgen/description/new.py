@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+from urllib.parse import quote
+
 from symgen.description.robot import check_identifier
-from symgen.description.schema import SCHEMA
+from symgen.description.schema import SCHEMA, schema_file
+from symgen.errors import DescriptionError
 
 _SKELETON = """\
 # {name}: a robot file. Replace the two joints below by yours; everything after `frames` may be left out.
@@ -49,3 +54,21 @@ def skeleton(name: str, schema: str | None = None) -> str:
     check_identifier(name, ("name",))
     first = "" if schema is None else f"# yaml-language-server: $schema={schema}\n"
     return first + _SKELETON.format(name=name, schema=SCHEMA)
+
+
+def skeleton_for(file: Path) -> str:
+    """Text of a skeleton for the robot file `file`, with the address of the installed JSON Schema as seen from its folder.
+
+    Raises DescriptionError where the name of the file is none of a robot file.
+    """
+    if file.suffix not in (".yaml", ".yml"):
+        raise DescriptionError(f"{file}: a robot file ends in .yaml")
+    return skeleton(file.stem, schema_address(file))
+
+
+def schema_address(file: Path) -> str:
+    """The installed JSON Schema as seen from the folder of `file`, percent-encoded: editors resolve it without network."""
+    try:
+        return quote(Path(os.path.relpath(schema_file(), file.resolve().parent)).as_posix())
+    except ValueError:  # on another drive
+        return schema_file().as_uri()

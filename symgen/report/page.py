@@ -60,17 +60,17 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
     SymgenError
         A length has no value.
     """
-    spec, certificate = module_spec(regrouping), certificate or certify(regrouping)
-    robot, found = spec.robot, effects(spec)
+    robot, spec = regrouping.robot, module_spec(regrouping)
+    drawing, parameters = figure(robot), effects(spec)
+    certificate = certificate or certify(regrouping)
     style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS))
-    drawing = figure(robot)
     return _template().render(
         robot=robot,
         title=robot.title or robot.name,
         style=Verbatim(style),
         script=Verbatim(script),
         policy=f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'; base-uri 'none'; form-action 'none'",
-        data=embedded(drawing | {"parameters": _pointed_at(spec, found)}),
+        data=embedded(drawing | {"parameters": _pointed_at(spec, parameters)}),
         verdict=_verdict(regrouping, certificate),
         joints=[j | {"name": mathml.math(mathml.name(f"q{j['j']}"))} for j in drawing["joints"]],
         passive=[(mathml.math(mathml.name(f"q{j}")), j, text) for j, text in passive_text(robot).items()],
@@ -80,8 +80,8 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
         elements=[_element_row(e) for e in robot.elements],
         gravity=[mathml.math(mathml.expression(e)) for e in robot.gravity],
         formulas=_formulas(spec),
-        places=_places(found),
-        without=_without_effect(found),
+        places=_places(parameters),
+        without=_without_effect(parameters),
         costs=[(name.replace("_", " "), function) for name, function in spec.functions.items()],
         certificate=certificate,
         version=VERSION,
@@ -167,29 +167,29 @@ def printed(text: str) -> str:
     return text.replace("**2", "²").replace("*", " ")
 
 
-def _places(found: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
+def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
     """Standard parameters by link or joint, with what becomes of each."""
     places: dict[str, list[dict[str, Any]]] = {}
-    for e in found:
+    for e in parameters:
         fate = "none" if not e.base else "alone" if e.base == (e.name,) else "regrouped"
         places.setdefault(e.place, []).append({"name": e.name, "symbol": mathml.math(mathml.parameter(e.name)), "fate": fate})
     return places
 
 
-def _without_effect(found: Sequence[Effect]) -> list[tuple[list[MathML], str]]:
+def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], str]]:
     """(parameters, the reason they share)."""
     reasons: dict[str, list[MathML]] = {}
-    for e in found:
+    for e in parameters:
         if e.why:
             reasons.setdefault(e.why, []).append(mathml.math(mathml.parameter(e.name)))
     return [(names, why) for why, names in reasons.items()]
 
 
-def _pointed_at(spec: ModuleSpec, found: Sequence[Effect]) -> Mapping[str, Any]:
+def _pointed_at(spec: ModuleSpec, parameters: Sequence[Effect]) -> Mapping[str, Any]:
     """What the page says of a parameter under the pointer."""
     robot = spec.robot
-    by_name = {e.name: e for e in found}
-    told: dict[str, Any] = {
+    by_name = {e.name: e for e in parameters}
+    entries: dict[str, Any] = {
         e.name: {
             "text": e.meaning,
             "unit": printed(e.unit),
@@ -199,12 +199,12 @@ def _pointed_at(spec: ModuleSpec, found: Sequence[Effect]) -> Mapping[str, Any]:
             "joints": e.joints,
             "why": e.why,
         }
-        for e in found
+        for e in parameters
     }
     for k, b in enumerate(spec.regrouping.base):
         own = by_name[b.own]
         absorbed = [name for name in b.combination if name != b.own or b.combination[name] != ONE]
-        told[b.name] = {
+        entries[b.name] = {
             "text": own.meaning + (f"; takes in {', '.join(absorbed)}" if absorbed else ""),
             "unit": printed(own.unit),
             "place": own.place,
@@ -213,7 +213,7 @@ def _pointed_at(spec: ModuleSpec, found: Sequence[Effect]) -> Mapping[str, Any]:
             "joints": [j for j, entered in zip(robot.joints, spec.structure[k], strict=True) if entered],
             "why": "",
         }
-    return told
+    return entries
 
 
 @lru_cache(maxsize=1)

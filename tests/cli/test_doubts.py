@@ -3,8 +3,8 @@
 import pytest
 from typer.testing import CliRunner
 
-from symgen.cli.doubts import equal_sides, nearly_round
 from symgen.cli.main import app
+from symgen.derive.doubts import equal_sides, nearly_round
 from symgen.description import load_robot, packaged_robots, parse_robot
 
 TWO_BARS = """\

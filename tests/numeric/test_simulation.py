@@ -18,7 +18,8 @@ from runtime.motion.controller_tick import plant_function
 from runtime.motion.dry_friction import dry_friction, friction_function
 from runtime.motion.reference import Reference, reference_of
 from runtime.motion.result import SimulationError
-from runtime.motion.simulation import Simulator, inertia_ratio, parameters_of, simulate
+from runtime.motion.simulation import Simulator, inertia_ratio, parameters_of
+from runtime.motion.simulation import simulate as simulate_study
 from runtime.observation.filters import filtered_states
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
@@ -28,6 +29,7 @@ from runtime.settings.study import study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 GTAU = 35.15065188248547  # N/V
+CASCADE = {"kind": "cascade", "kp": 160.18, "kv": 243.45, "gain": 35.15}
 PUBLISHED = np.array([95.1089, 203.5034, 20.3935, -3.1648])
 TX40 = {  # gains of the BIRDy benchmark, joint side
     "law": {
@@ -58,6 +60,11 @@ def emps():
 @pytest.fixture(scope="module")
 def truth(tx40):
     return parameters_of(tx40, controller())
+
+
+def simulate(model, X, controller, reference, **settings):
+    """One run with parameters and reference of its own."""
+    return Simulator(model, controller).run(X, reference, **settings)
 
 
 def relative(measured, simulated):
@@ -142,7 +149,7 @@ def potential(model, values, q):
 def test_energy_of_a_falling_arm_only_falls(tx40, step):
     """Kinetic and potential energy of the TX40, coupled wrist friction and gravity, no torque, from four random states until joints rest."""
     symbolic = load_symbolic("tx40", folder=GENERATED)
-    friction = dry_friction(symbolic)
+    friction = dry_friction(tx40)
     assert [1, 0, 0, 0, 0, 0] in friction.G.tolist() and [0, 0, 0, 0, 1, 1] in friction.G.tolist() and len(friction.G) == 7
     values = {name: 0.0 if name.startswith("OFFSET") else x for name, x in tx40.VALUES.items()}
     X = tx40.base_parameters(values)
@@ -169,7 +176,7 @@ def test_forces_at_rest_are_those_of_the_quadratic_program(tx40, truth):
     from scipy.optimize import lsq_linear
 
     symbolic = load_symbolic("tx40", folder=GENERATED)
-    friction = dry_friction(symbolic)
+    friction = dry_friction(tx40)
     function = friction_function(symbolic, friction, {})
     G, plus = friction.G, friction.plus @ truth
     rng, size = np.random.default_rng(0), np.array([7, 8, 6, 2.4, 5, 3.5])
@@ -191,7 +198,7 @@ def test_forces_at_rest_are_those_of_the_quadratic_program(tx40, truth):
 def test_held_by_friction_alone(tx40, truth):
     """Below the breakaway torque nothing moves, not even slowly; the coupled element of the wrist carries joints 5 and 6 together."""
     symbolic = load_symbolic("tx40", folder=GENERATED)
-    friction = dry_friction(symbolic)
+    friction = dry_friction(tx40)
     plant = plant_function(symbolic, friction, {}, "rk4")
     column = {name: k for k, name in enumerate(tx40.BASE_PARAMETERS)}
     X = truth.copy()
@@ -397,3 +404,30 @@ def test_without_a_compiler_the_same_bits(tx40, truth, monkeypatch):
     with pytest.warns(UserWarning, match="CasADi's own interpreter in place of C"):
         plain = simulate(tx40, truth, settings, reference)
     np.testing.assert_allclose(plain.q, compiled.q, rtol=0, atol=1e-12)
+
+
+def test_a_study_is_one_call(emps, tmp_path):
+    """Parameters of the robot file, reference of a file, noise of the settings: as the simulator gives them."""
+    table = "q1\n" + "".join(f"{0.05 * (1 - np.cos(k / 100)):.12g}\n" for k in range(600))
+    (tmp_path / "motion.csv").write_text(table)
+    loop = {
+        "law": CASCADE,
+        "rate": 1000,
+        "reference": {"file": "motion.csv", "limits": "ignore"},
+        "torque": {"noise": 0.5},
+        "encoder": {"step": 1e-6},
+    }
+    study = study_from_mapping({"controller": loop})
+    run = simulate_study(emps, study, folder=str(tmp_path))
+    assert run.name.startswith("SIMULATED emps") and not run.ideal
+    expected = simulate(
+        emps, parameters_of(emps, study.controller), study.controller, reference_of(study.controller, emps, folder=tmp_path)
+    )
+    np.testing.assert_array_equal(run.q_measured, expected.q_measured)
+    np.testing.assert_array_equal(run.tau_measured, expected.tau_measured)
+    summary = run.summary()
+    assert summary["samples"] == 600 and summary["parameters"]["M1R"] == emps.VALUES["M1"] + emps.VALUES["Ia1"]
+    assert "nothing was measured" in str(run) and "m, N" in str(run)
+    assert simulate_study(emps, study, folder=tmp_path, ideal=True, name="exact").summary()["ideal"]
+    with pytest.raises(InputError, match="no section `controller`"):
+        simulate_study(emps, study_from_mapping({}))

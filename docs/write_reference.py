@@ -1,0 +1,77 @@
+"""Write the pages of docs/reference, docs/guide/examples.md and docs/api from the program: `python docs/write_reference.py`.
+
+Text between `<!-- generated: NAME ARGUMENT -->` and `<!-- end -->` of a page is made by the function NAME; pages of docs/api beside its index are made
+whole, one for each room. `--check` writes nothing, names the pages that are not current and ends with exit code 1 where there is one.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+sys.path[:0] = [str(DOCS.parent), str(DOCS / "_ext")]
+
+import api  # noqa: E402
+import reference  # noqa: E402
+
+MARK = re.compile(r"^<!-- generated: (?P<name>\w+)(?: (?P<argument>[\w.]+))? -->\n.*?^<!-- end -->$", re.MULTILINE | re.DOTALL)
+SOURCES: dict[str, Callable[..., str]] = {
+    "commands": reference.commands,
+    "contents": api.contents,
+    "examples": reference.examples,
+    "names": api.names,
+    "robot_file": reference.robot_file,
+    "robots": reference.robots,
+    "study_file": reference.study_file,
+}
+WHOLE = "<!-- Written by docs/write_reference.py from the docstrings: edit those. -->\n\n"
+
+
+def filled(text: str) -> str:
+    """A page with its generated parts made anew."""
+
+    def made(mark: re.Match[str]) -> str:
+        begin = mark[0].split("\n", 1)[0]
+        content = SOURCES[mark["name"]](*filter(None, [mark["argument"]]))
+        return f"{begin}\n\n{tidy(content)}\n<!-- end -->"
+
+    return MARK.sub(made, text)
+
+
+def tidy(text: str) -> str:
+    """Without blanks at the ends of lines, and without more than one empty line in a row."""
+    return re.sub(r"\n{3,}", "\n\n", re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)).strip() + "\n"
+
+
+def pages() -> Iterator[tuple[Path, str]]:
+    """(path, text) of every page with generated text."""
+    for path in sorted(DOCS.rglob("*.md")):
+        text = path.read_text(encoding="utf-8")
+        if MARK.search(text):
+            yield path, filled(text)
+    for package in api.rooms():
+        yield DOCS / "api" / f"{api.page_of(package)}.md", WHOLE + tidy(api.room(package))
+
+
+def outdated() -> dict[Path, str | None]:
+    """{path: text it should have, None where it should not be} of every page that is not current."""
+    expected: dict[Path, str | None] = dict(pages())
+    expected |= {path: None for path in (DOCS / "api").glob("*.md") if path not in expected}
+    return {path: text for path, text in expected.items() if text != (path.read_text(encoding="utf-8") if path.is_file() else None)}
+
+
+def main() -> None:
+    stale = outdated()
+    for path, text in stale.items():
+        if "--check" not in sys.argv:
+            path.write_text(text, encoding="utf-8") if text is not None else path.unlink()
+        print(f"{path.relative_to(DOCS.parent)}{' is not current' if '--check' in sys.argv else ''}")
+    if "--check" in sys.argv and stale:
+        sys.exit("run python docs/write_reference.py")
+
+
+if __name__ == "__main__":
+    main()

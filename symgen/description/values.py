@@ -1,0 +1,80 @@
+"""Numbers for a robot that come from elsewhere: constants of a command line, standard parameters of a table or of an estimate."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import replace
+from math import isfinite
+
+from symgen.description.grammar import parse
+from symgen.description.robot import Robot
+from symgen.errors import DescriptionError
+
+
+def assignment(text: str) -> tuple[str, float]:
+    """Name and number of NAME=NUMBER, the number a constant expression. Raises DescriptionError or ExpressionError."""
+    name, equals, value = text.partition("=")
+    try:
+        if name.strip() and equals:
+            return name.strip(), float(parse(value, ()))
+    except (ValueError, ZeroDivisionError, OverflowError):
+        pass
+    raise DescriptionError(f"--constant {text}; expected NAME=NUMBER")
+
+
+def values_of_csv(content: bytes, file: str) -> dict[str, float]:
+    """Standard parameters by name from lines of name,value; a header name,value may stand first.
+
+    Raises DescriptionError, with file and line, where a line is something else, or there is none.
+    """
+    values: dict[str, float] = {}
+    try:
+        rows = list(csv.reader(content.decode("utf-8-sig").splitlines()))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise DescriptionError(f"{file}: {error}; expected lines of name,value") from error
+    for line, row in enumerate(rows, start=1):
+        if row in ([], ["name", "value"]):
+            continue
+        try:
+            name, value = row
+            values[name] = float(value)
+        except ValueError as error:
+            raise DescriptionError(f"{file}, line {line}: found {','.join(row)[:60]!r}; expected name,value") from error
+        if not isfinite(values[name]):
+            raise DescriptionError(f"{file}, line {line}: {name[:60]} is {value[:60]}; expected a finite number")
+    if not values:
+        raise DescriptionError(f"{file}: no values; expected lines of name,value")
+    return values
+
+
+def with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
+    """`robot` with these standard parameters as its values, over those of its file."""
+    return replace(robot, values={**robot.values, **values})
+
+
+def with_estimate(robot: Robot, standard: object, file: str) -> Robot:
+    """`robot` with the standard parameters of a feasible estimate as its values.
+
+    Parameters
+    ----------
+    standard : object
+        `details["standard"]` of the estimate: a mapping from names to numbers.
+    file : str
+        File of the estimate, for messages.
+
+    Raises
+    ------
+    DescriptionError
+        The estimate has no standard parameters, or those of another robot.
+    """
+    if not isinstance(standard, dict):
+        raise DescriptionError(
+            f"{file}: holds base parameters alone; a program needs standard ones: set estimate: {{method: feasible}} in the study and identify again"
+        )
+    for name, x in standard.items():
+        if isinstance(x, bool) or not isinstance(x, int | float) or not abs(x) < 1e300:
+            raise DescriptionError(f"{file}: details.standard: {name[:60]} is {x!r:.60}; expected a number; the file was changed")
+    if unknown := sorted(set(standard) - set(robot.parameters)):
+        raise DescriptionError(f"{file}: {', '.join(unknown[:12])} are no parameters of {robot.name}; is it the estimate of another robot?")
+    return with_values(robot, {name: float(x) for name, x in standard.items()})
