@@ -1,20 +1,12 @@
-"""Puts tests/ on the import path (`from oracles... import ...`), makes hypothesis reproducible, finds the measured records, keeps what is slow to derive.
+"""Puts tests/ on the import path (`from oracles... import ...`), makes hypothesis reproducible, finds the measured records.
 
 Records: SYMGEN_DATA, the cache, then ../shared/data beside the repository; else the test is skipped, or fails where they are required.
-Relations of a mechanism with general loops take seconds: each is computed once a run, by the program itself, and kept on disk for all workers.
 """
 
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy loads: test processes would fight for the cores
 
-import fcntl
-import hashlib
-import pickle
-import shutil
-import sys
-import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -26,7 +18,6 @@ from runtime.records.datasets import DATASETS, fetch, locate
 settings.register_profile("symgen", derandomize=True, deadline=None)
 settings.load_profile("symgen")
 
-DERIVED = "SYMGEN_TEST_DERIVED"  # folder of what this run has derived, of the controller and all workers
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -58,34 +49,6 @@ def tx40_data():
     """Paths of the TX40 files by name; `fetch` finds them too."""
     with pytest.MonkeyPatch.context() as patch:
         yield _provide("tx40", patch)
-
-
-def pytest_configure(config):
-    if not hasattr(config, "workerinput"):
-        os.environ[DERIVED] = tempfile.mkdtemp(prefix="symgen-tests-")
-
-    module = sys.modules["symgen.regroup.regrouping"]
-    module.base_and_relations = once_a_run(module.base_and_relations, Path(os.environ[DERIVED]))
-
-
-def pytest_unconfigure(config):
-    if not hasattr(config, "workerinput"):
-        shutil.rmtree(os.environ.pop(DERIVED), ignore_errors=True)
-
-
-def once_a_run(function, folder):
-    """The same function of (robot, names), computed by the first worker that asks for it."""
-
-    def kept(robot, names):
-        key = hashlib.sha256(repr((replace(robot, file="", title="", source=""), names)).encode()).hexdigest()
-        path = folder / key
-        with path.with_suffix(".lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            if not path.exists():
-                path.write_bytes(pickle.dumps(function(robot, names)))
-        return pickle.loads(path.read_bytes())  # noqa: S301 (written a moment ago by this run)
-
-    return kept
 
 
 def pytest_terminal_summary(terminalreporter, config):

@@ -44,6 +44,8 @@ def _along(motion: Motion, e: Element, j: int) -> Scalar:
         if type(rate) is int:
             return 0  # at rest
         key = motion.geometry.closure.in_independent(row)
+        if not key:
+            return 0  # the closure holds s still
         if e.when is not None:
             direction, speed = motion.algebra.one_sided(rate, key, e.when)
             return direction if e.kind == "coulomb" else speed

@@ -322,7 +322,8 @@ def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, fl
         D = np.concatenate([D, block[closed]])[:states]
         state = np.concatenate([state, np.array([q, qd, qdd])[:, closed]], axis=1)[:, :states]
         if len(D) == states:
-            return Sample(model, *state, D)
+            q, qd, qdd = state
+            return Sample(model, q, qd, qdd, D)
     if not robot.passive:
         raise DescriptionError(
             f"{robot.name}: torques are not finite for the constants {dict(robot.constants)}; check their values", path=("constants",)

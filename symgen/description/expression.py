@@ -274,7 +274,7 @@ def _factors(m: Monomial, c: Fraction) -> str:
     return "*".join(up) + "".join(f"/{d}" for d in down)
 
 
-def _is_inverse(a: str | Call) -> bool:
+def _is_inverse(a: str | Number | Call) -> bool:
     return isinstance(a, Call) and a.function == "inv"
 
 

@@ -32,9 +32,9 @@ from symgen.description.robot import Robot
 from symgen.regroup.finite_field import rref, small_rational, solve_each
 from symgen.regroup.numbers import numbers_of
 
-MAX_UNKNOWNS = 900
+MAX_UNKNOWNS = 500
 MAX_PRIMES = 24  # of 31 bits each: numerators and denominators of some 110 digits
-MAX_WORK = 1e9  # multiplications of one recognition, some seconds
+MAX_WORK = 4e8  # multiplications of one recognition, some seconds
 FREEDOMS = (("numbers", "pi"), ("numbers",), ())  # what is an indeterminate beside constants and transcendental angles
 DEGREES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (3, 0), (3, 2), (3, 3), (4, 0), (4, 4), (6, 0), (6, 6))
 

@@ -27,7 +27,7 @@ from symgen.description.robot import REVOLUTE, Robot
 from symgen.emit.numpy_target import render
 from symgen.emit.spec import module_spec
 from symgen.regroup.certificate import certify_formulas
-from symgen.regroup.regrouping import RECOGNISED, Regrouping, regroup
+from symgen.regroup.regrouping import EXACT, Regrouping, regroup
 
 Array = np.ndarray[Any, Any]
 GENERAL = ("four_bar", "five_bar")
@@ -295,7 +295,7 @@ def test_singular_configuration(emitted: Emitted) -> None:
 def test_four_bar_formula() -> None:
     """D_MX3 = (L1^2 D_ZZ1 + L1 D_MX1 + L2^2 D_ZZ2 + L2 D_MX2)/L3 - L3 D_ZZ3, x axes along the bars: symbolically."""
     regrouping = regrouped("four_bar")
-    assert regrouping.method == RECOGNISED
+    assert regrouping.method == EXACT
     row = {b.own: b.combination["MX3"] for b in regrouping.base if "MX3" in b.combination}
     expected = {"ZZ1": "L1**2/L3", "MX1": "L1/L3", "ZZ2": "L2**2/L3", "MX2": "L2/L3", "ZZ3": "-L3"}
     assert row == {own: parse(text) for own, text in expected.items()}
