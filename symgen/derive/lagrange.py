@@ -312,7 +312,7 @@ def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, fl
         D = np.concatenate([D, block[closed]])[:states]
         state = np.concatenate([state, np.array([q, qd, qdd])[:, closed]], axis=1)[:, :states]
         if len(D) == states:
-            return Sample(model, *state, D)
+            return Sample(model, state[0], state[1], state[2], D)
     if not robot.passive:
         raise DescriptionError(
             f"{robot.name}: torques are not finite for the constants {dict(robot.constants)}; check their values", path=("constants",)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -76,3 +76,14 @@ def turn(axis: int, angle: float) -> Array:
     R = np.eye(3)
     R[j, j], R[j, k], R[k, j], R[k, k] = c, -s, s, c
     return R
+
+
+def transform(row: Sequence[float]) -> Array:
+    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) of a row gamma, b, alpha, d, theta, r; (4, 4)."""
+    gamma, b, alpha, d, theta, r = row
+    T = np.eye(4)
+    for axis, angle, shift in ((2, gamma, b), (0, alpha, d), (2, theta, r)):
+        step = np.eye(4)
+        step[:3, :3], step[axis, 3] = turn(axis, angle), shift
+        T = T @ step
+    return T

@@ -20,7 +20,7 @@ import numpy as np
 
 from symgen.description.expression import PI, ZERO, Expression, twelfths
 from symgen.description.robot import FIXED, PRISMATIC, REVOLUTE, Frame
-from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree, turn
+from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree, transform
 
 DIGITS = 13  # decimals kept of lengths (m) and angles (rad)
 SAME = 1e-12  # m, rad: closer is equal
@@ -70,7 +70,7 @@ def _keep(table: Table, ant: int, name: str, pose: Array) -> None:
         to_aside, ant = _row(table, ant, FIXED, _normal(np.array([1.0, 0.0, 0.0]), pose[:3, 3]))
         pose = np.linalg.inv(to_aside) @ pose
     before = _numbered(_normal(pose[:3, 2], pose[:3, 3]))
-    rest = np.linalg.inv(_transform((*before, 0.0, 0.0))) @ pose
+    rest = np.linalg.inv(transform((*before, 0.0, 0.0))) @ pose
     theta, r = _numbered((math.atan2(rest[1, 0], rest[0, 0]), rest[2, 3]))
     _, j = _row(table, ant, FIXED, before, theta, r)
     table.kept[j] = name
@@ -105,7 +105,7 @@ def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
         pose = np.linalg.inv(to_aside) @ pose
         axis, point, ant = pose[:3, :3] @ joint.axis, pose[:3, 3], aside
     before = _numbered(_normal(axis, point))
-    body = _body(table.tree, joint.child, np.linalg.inv(_transform((*before, 0.0, 0.0))) @ pose)
+    body = _body(table.tree, joint.child, np.linalg.inv(transform((*before, 0.0, 0.0))) @ pose)
     theta = r = 0.0
     if body.joints:
         first, link = body.joints[0]
@@ -116,7 +116,7 @@ def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
             theta, r = _numbered((theta, r))
     sigma = PRISMATIC if joint.kind == "prismatic" else REVOLUTE
     _, j = _row(table, ant, sigma, before, theta, r)
-    own = np.linalg.inv(_transform((0.0, 0.0, 0.0, 0.0, theta, r)))
+    own = np.linalg.inv(transform((0.0, 0.0, 0.0, 0.0, theta, r)))
     table.bodies[j] = Body({name: own @ X for name, X in body.links.items()}, [(held, own @ X) for held, X in body.joints])
     table.joint[j] = joint
     return j
@@ -141,17 +141,6 @@ def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
     if abs(gamma) > math.pi / 2 + SAME:  # the same normal, x the other way
         gamma, alpha, d = gamma - math.copysign(math.pi, gamma), -alpha, -d
     return gamma, b, alpha, d
-
-
-def _transform(row: Sequence[float]) -> Array:
-    """Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), (4, 4)."""
-    gamma, b, alpha, d, theta, r = row
-    T = np.eye(4)
-    for axis, angle, shift in ((2, gamma, b), (0, alpha, d), (2, theta, r)):
-        step = np.eye(4)
-        step[:3, :3], step[axis, 3] = turn(axis, angle), shift
-        T = T @ step
-    return T
 
 
 def _numbered(row: Sequence[float]) -> tuple[float, ...]:
@@ -188,7 +177,7 @@ def _row(table: Table, ant: int, sigma: int, before: Sequence[float], theta: flo
             r=moved + q if sigma == PRISMATIC else moved,
         )
     )
-    return _transform((*before, theta, r)), j
+    return transform((*before, theta, r)), j
 
 
 def _length(table: Table, name: str, x: float) -> Expression:
