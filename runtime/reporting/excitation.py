@@ -9,7 +9,8 @@ import matplotlib as mpl
 import numpy as np
 
 from runtime.reporting.figures import STYLE, panels_figure
-from runtime.reporting.page import Image, Page, Section, Table
+from runtime.reporting.page import Image, Page, Section
+from runtime.table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

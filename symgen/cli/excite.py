@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from runtime.result_files import reserved
-from symgen.cli.session import opened_model, progress_bar, reported_errors, single_thread, symbolic_file, yaml_text
+from symgen.cli.session import model_of, progress_bar, reported_errors, single_thread, symbolic_path
 
 if TYPE_CHECKING:
     from runtime.excitation.criteria import Limits, Weights
@@ -59,15 +59,16 @@ def excite(
     single_thread()
     given: dict[str, Any] = {"criterion": criterion, "starts": starts, "rate": rate, "seed": seed}
     given["columns"] = columns.split(",") if columns and columns not in ("essential", "all") else columns
-    with reported_errors(), reserved(output) as results, opened_model(robot) as model:
+    with reported_errors(), reserved(output) as results:
         from runtime.excitation.criteria import limits_of
         from runtime.excitation.search import excite as search
+        from runtime.records.named import study_of
         from runtime.records.reading import read_records
         from runtime.settings.excitation import ExcitationSettings
-        from runtime.records.named import study_of
         from runtime.settings.schema import structure
         from runtime.settings.study import Study, to_mapping
 
+        model = model_of(robot)
         study = Study()
         records: list[Record] = []
         if record is not None:
@@ -78,7 +79,7 @@ def excite(
         known = _known(model, replace(study, excitation=settings), settings, records)
         limits = limits_of(model, settings.limits)
         with progress_bar("starts") as progress:
-            path = str(symbolic_file(robot, model))
+            path = str(symbolic_path(robot, model))
             found = search(model, path, known.study, settings, known.weights, limits, known.X, workers=workers, progress=progress)
         summary = summary_of(model, found, known, settings, limits)
         if results is not None:
@@ -93,8 +94,8 @@ def _known(model: GeneratedModel, study: Study, settings: ExcitationSettings, re
     import numpy as np
 
     from runtime.errors import InputError
-    from runtime.estimators import estimate
-    from runtime.estimators.essential import essential
+    from runtime.estimators.essential import essential_of
+    from runtime.estimators.methods import estimate_of
     from runtime.excitation.criteria import kept_correlation, weights_of
     from runtime.observation.observation import observe, stack
 
@@ -112,10 +113,10 @@ def _known(model: GeneratedModel, study: Study, settings: ExcitationSettings, re
         return Known(study, X, "values of the robot file", weights_of(model, settings, dict(zip(model.BASE_PARAMETERS, X, strict=True))))
     seen = stack([observe(model, record, study) for record in records])
     linear = replace(study.estimate, method="ols", weights="none", options={}, columns="all")
-    fit = estimate(seen, linear, model=model)
+    fit = estimate_of(seen, linear, model=model)
     if fit.status == "rank-deficient":
         raise InputError(f"the record does not determine {', '.join(' '.join(g) for g in fit.groups)}; leave RECORD out, or name columns")
-    chosen = essential(seen, study.essential, linear)
+    chosen = essential_of(seen, study.essential, linear)
     by_name = dict(zip(fit.names, fit.X, strict=True))
     s = [joint.sigma_rho for joint in fit.per_joint]
     weights = weights_of(model, settings, by_name, essential=chosen.names, s=s)
@@ -189,6 +190,7 @@ def excitation_files(
     from runtime.reporting import figures as plots
     from runtime.reporting.excitation import excitation_page, motion_figure
     from runtime.reporting.page import render
+    from runtime.settings.yaml import yaml_text
 
     functions: Any = model
     t, q, qd, qdd = found.motion.sampled(summary["settings"]["rate"])
