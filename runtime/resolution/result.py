@@ -23,12 +23,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from scipy.special import stdtrit
 
-from runtime.estimators.estimate import Estimate, json_text
+from runtime.estimators.estimate import Estimate
+from runtime.json_documents import Vector, json_text
 from runtime.latex import error_table, level_table
 from runtime.markup import Markup, number
 from runtime.observation.observation import Observation
@@ -50,13 +51,28 @@ LISTED = 1000
 """Largest number of runs that the JSON text lists; beyond, they are in the archives of the checkpoint (`runtime.resolution.checkpoint`)."""
 MOST_RUNS = 100_000
 """Largest number of runs that `runs_needed` answers."""
+Verdict = Literal["unbiased", "doubtful", "biased"]
 NORMAL, TRIANGULAR = "normal equations", "triangular factor"
 """How the least squares of a run was solved."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run: parameters in column order, ||Y - W_CESTAC X|| in N m, and how the least squares was solved (NORMAL or TRIANGULAR)."""
+    """One run.
+
+    Attributes
+    ----------
+    level : int
+        Number of the level, from 0.
+    run : int
+        Number of the run, from 0.
+    X : tuple of float, SI
+        Parameters in column order.
+    residual_norm : float, N m or N
+        ||Y - W_CESTAC X||.
+    method : str
+        How the least squares was solved: NORMAL or TRIANGULAR.
+    """
 
     level: int
     run: int
@@ -125,7 +141,15 @@ class Runs(Sequence[Run]):
 
 @dataclass(frozen=True)
 class Level:
-    """Steps of one column of the study: position (rad or m) and motor torque (N m or N); 0 means not perturbed."""
+    """Steps of one column of the study; 0 means not perturbed.
+
+    Attributes
+    ----------
+    delta : float, rad or m
+        Step of the position.
+    torque : float, N m or N
+        Step of the motor torque.
+    """
 
     delta: float
     torque: float = 0.0
@@ -144,28 +168,60 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class LevelResult:
-    """One resolution. Arrays have shape (b,), in the order of the names.
+    """One level of a study. Arrays are in the order of the names.
 
-    mean, sigma, relative_sigma, e : eqs. (18)-(21).   half_width : of the Student interval of the mean, SI; `half_width_percent` of |X_LS|.
-    e_rho, e_rho_own, increase, increase_own : the residual, in %; see the head of this module.
-    verdict : "unbiased", "doubtful" or "biased"; residual_verdict : the same of `increase` alone.   decided_by : %e of what decided, by name ("rho" for the residual), largest first.
-    runs_needed : runs after which the intervals of the deciding parameters are narrower than 1 % of X_LS.
+    Attributes
+    ----------
+    level : Level
+        Steps.
+    runs : Runs
+        The runs.
+    mean : ndarray, shape (b,), SI
+        Mean of the runs, eq. (18).
+    sigma : ndarray, shape (b,), SI
+        Standard deviation of the runs, eq. (19).
+    relative_sigma : ndarray, shape (b,), %
+        100 sigma / |mean|, eq. (20).
+    e : ndarray, shape (b,), %
+        100 |1 - mean / X_LS|, eq. (21).
+    half_width : ndarray, shape (b,), SI
+        Half width of the Student interval of the mean.
+    half_width_percent : ndarray, shape (b,), %
+        100 half_width / |X_LS|.
+    e_rho : float, %
+        Eq. (22) as printed.
+    e_rho_own : float, %
+        Eq. (22) with the W of each run.
+    increase : float, %
+        Increase of the residual norm over the norm of Y.
+    increase_own : float, %
+        The same with the W of each run.
+    verdict : str
+        unbiased, doubtful or biased.
+    residual_verdict : str
+        Verdict of `increase` alone.
+    decided_by : mapping of float, %
+        Errors that decided the verdict, by name (rho for the residual), largest first.
+    runs_needed : int
+        Runs after which the intervals of the deciding parameters are narrower than 1 % of X_LS.
+    message : str
+        The verdict in words.
     """
 
     level: Level
     runs: Runs
-    mean: Array
-    sigma: Array
-    relative_sigma: Array
-    e: Array
-    half_width: Array
-    half_width_percent: Array
+    mean: Vector
+    sigma: Vector
+    relative_sigma: Vector
+    e: Vector
+    half_width: Vector
+    half_width_percent: Vector
     e_rho: float
     e_rho_own: float
     increase: float
     increase_own: float
-    verdict: str
-    residual_verdict: str
+    verdict: Verdict
+    residual_verdict: Verdict
     decided_by: Mapping[str, float]
     runs_needed: int
     message: str
@@ -193,9 +249,9 @@ class Cestac:
         return deciding_names(self.reference)
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         """The worst verdict of the levels."""
-        return max((result.verdict for result in self.levels), key=("unbiased", "doubtful", "biased").index, default="unbiased")
+        return max((result.verdict for result in self.levels), key=get_args(Verdict).index, default="unbiased")
 
     @property
     def lists_runs(self) -> bool:
@@ -323,7 +379,7 @@ def runs_needed(spread: float) -> int:
     return int(N[np.argmax(enough)]) if enough.any() else MOST_RUNS
 
 
-def _verdict(errors: Mapping[str, float]) -> tuple[str, dict[str, float]]:
+def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
     """Verdict, and the errors that decided it, largest first; the largest one alone when all are negligible."""
     ordered = sorted(errors.items(), key=lambda item: -item[1])
     verdict = _judged(ordered[0][1])
@@ -333,7 +389,7 @@ def _verdict(errors: Mapping[str, float]) -> tuple[str, dict[str, float]]:
     return verdict, {name: value for name, value in ordered if value >= limit}
 
 
-def _judged(error: float) -> str:
+def _judged(error: float) -> Verdict:
     """Verdict of one error, in %."""
     return "unbiased" if error < NEGLIGIBLE else "biased" if error > BIASED else "doubtful"
 
