@@ -25,8 +25,8 @@ single_thread()
 import numpy as np  # noqa: E402  (numpy reads the number of threads when it loads)
 from scipy.special import stdtrit  # noqa: E402
 
-from runtime.estimators import linear_system  # noqa: E402
-from runtime.estimators.essential import essential  # noqa: E402
+from runtime.estimators.methods import linear_system  # noqa: E402
+from runtime.estimators.essential import essential_of  # noqa: E402
 from runtime.estimators.linear import assemble  # noqa: E402
 from runtime.observation.observation import observe  # noqa: E402
 from runtime.observation.position_errors import perturbation  # noqa: E402
@@ -134,7 +134,7 @@ def main():
     for name in sys.argv[1:] or RUNS:
         with opened_model(name) as model, TemporaryDirectory() as folder:
             study, record = opened(name, model, Path(folder))
-            found = essential(observe(model, record, study), study.essential, study.estimate)
+            found = essential_of(observe(model, record, study), study.essential, study.estimate)
             advice, level = steps_table(name, model, study, record, found.names)
             cost(name, model, study, record, found.names, advice, level)
 

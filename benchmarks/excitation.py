@@ -21,8 +21,8 @@ from ruamel.yaml import YAML
 from simulation import LAW
 
 from runtime import load_model
-from runtime.estimators import estimate
-from runtime.estimators.essential import essential
+from runtime.estimators.methods import estimate_of
+from runtime.estimators.essential import essential_of
 from runtime.excitation.criteria import excesses, kept_correlation, limits_of, observed, usage, weights_of
 from runtime.excitation.search import excite
 from runtime.motion.reference import Reference
@@ -52,7 +52,7 @@ def main() -> None:
     study, folder = study_of("tx40")
     (record,) = read_records(study.record, model, folder=folder)
     seen = observe(model, record, study)
-    fit, chosen = estimate(seen, model=model), essential(seen, study.essential)
+    fit, chosen = estimate_of(seen, model=model), essential_of(seen, study.essential)
     s = [joint.sigma_rho for joint in fit.per_joint]
     settings = ExcitationSettings(columns=given.columns, starts=given.starts, criterion=given.criterion, rate=RATE)
     weights = weights_of(model, settings, dict(zip(fit.names, fit.X, strict=True)), essential=chosen.names, s=s)
@@ -110,7 +110,7 @@ def confirm(model: object, study: object, motion: object, s: np.ndarray, records
     for _ in range(records):
         tau = clean.tau + (s / left) * rng.standard_normal(clean.tau.shape)
         noisy = replace(clean, tau=tau)
-        estimates.append(estimate(observe(model, noisy, asked), asked.estimate, model=model).X)
+        estimates.append(estimate_of(observe(model, noisy, asked), asked.estimate, model=model).X)
     scatter = 100 * np.std(estimates, axis=0, ddof=1) / everything.size
     used = planned < 30
     for label, sigma in (("planned motion", planned), ("simulated motion", predicted)):

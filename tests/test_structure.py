@@ -49,7 +49,6 @@ ONLY_IN = {  # library: files and folders that may import it
     "scipy": ("runtime/",),
 }
 LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be mended, then empty
-    "runtime.observation.by_blocks": {"runtime.estimators", "runtime.estimators.block_covariance"},
     "symgen.demo.demonstration": {"symgen.cli.session"},
     "symgen.demo.haptic": {f"symgen.cli.{name}" for name in ("session", "writing", "identify", "pages", "resolution_files")},
     "symgen.demo.simulated_record": {"symgen.cli.session"},

@@ -29,7 +29,7 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import linear_system
+from runtime.estimators.methods import linear_system
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import assemble
 from runtime.model.drives import Drives

@@ -24,7 +24,7 @@ import numpy as np
 
 from runtime import distributed
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import linear_system
+from runtime.estimators.methods import linear_system
 from runtime.estimators.linear import assemble
 from runtime.model.compile_cache import processor
 from runtime.model.compiled import target_of, text_of

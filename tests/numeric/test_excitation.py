@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.excitation.criteria import excesses, limits_of, observed, usage, weights_of
 from runtime.excitation.search import Problem, _search, excite, one_start, smoothed
 from runtime.model.casadi import load_symbolic
@@ -103,7 +103,7 @@ def test_prediction_is_what_identification_finds(planar: tuple) -> None:
     estimates = []
     for _ in range(60):
         record = Record(t=t, q=q, tau=clean + deviations * rng.standard_normal(clean.shape), rate=1000.0)
-        estimates.append(estimate(observe(model, record, asked), asked.estimate, model=model).X)
+        estimates.append(estimate_of(observe(model, record, asked), asked.estimate, model=model).X)
     size = weights_of(model, settings(), dict(zip(model.BASE_PARAMETERS, X, strict=True))).size
     scatter = 100 * np.std(estimates, axis=0, ddof=1) / size
     ratio = scatter / np.array(list(found.relative_sigma.values()))

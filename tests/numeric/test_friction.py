@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from runtime import InputError, Record, observe
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.identification.friction import friction_curves, own_friction
 from runtime.identification.friction_laws import correlation_time
 from runtime.model.generated import load_model
@@ -45,8 +45,8 @@ def simulated(arm, law, noise: float = 0.05, seconds: float = 40.0, seed: int = 
         rest[own_friction(arm, j)] = 0.0
     rigid = arm.inverse_dynamics(q, qd, qdd, rest)
     tau = rigid + law(qd, rigid) + noise * np.random.default_rng(seed).standard_normal(q.shape)
-    record = Record(t, q, tau, RATE)
-    fit = estimate(observe(arm, record, STUDY))
+    record = Record(t, q, tau, rate=RATE)
+    fit = estimate_of(observe(arm, record, STUDY))
     return record, type(fit)(**{**vars(fit), "X": X})
 
 
@@ -115,7 +115,7 @@ def test_emps_has_the_published_asymmetric_friction(emps_data) -> None:
     emps = emitted("emps")
     study = study_from_mapping(dataset_study("emps"))
     records = read_records(study.record, emps)
-    fit = estimate(observe(emps, records[0], study), study.estimate, model=emps)
+    fit = estimate_of(observe(emps, records[0], study), study.estimate, model=emps)
     (curve,) = friction_curves(emps, records, study, fit)
     assert curve.chosen == "asymmetric"
     published = {"FVP": 166.7061, "FSP": 20.1440, "FVN": 240.4236, "FSN": 20.6277}
@@ -128,7 +128,7 @@ def test_tx40_record(tx40_data) -> None:
     tx40 = emitted("tx40")
     study = study_from_mapping(dataset_study("tx40"))
     records = read_records(study.record, tx40)
-    curves = friction_curves(tx40, records, study, estimate(observe(tx40, records[0], study), model=tx40))
+    curves = friction_curves(tx40, records, study, estimate_of(observe(tx40, records[0], study), model=tx40))
     assert [curve.joint for curve in curves] == list("123456")
     assert all(curve.law.held_out < curve.laws[0].held_out for curve in curves)
     assert curves[2].chosen == "stribeck+load" and curves[2].law.held_out < 0.7 * curves[2].laws[0].held_out

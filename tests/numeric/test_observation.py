@@ -30,7 +30,7 @@ def study(**sections):
 @pytest.fixture(scope="module")
 def record():
     q, qd, qdd = motion(T)
-    return Record(T, q, planar.regressor(q, qd, qdd) @ TRUE, RATE, "arm", {"arm.csv": "ab" * 32})
+    return Record(T, q, planar.regressor(q, qd, qdd) @ TRUE, rate=RATE, name="arm", files={"arm.csv": "ab" * 32})
 
 
 def test_noise_free_data_return_the_parameters(record):
