@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from symgen.derive.columns import element_names
 from symgen.derive.loops import close
@@ -15,7 +16,7 @@ from symgen.regroup.formula import Python
 from symgen.version import VERSION
 
 
-def context(spec: ModuleSpec, command: str | None, language: Python, array: str, quote: str = "") -> dict[str, object]:
+def context(spec: ModuleSpec, command: str | None, language: Python, array: str, quote: str = "") -> dict[str, Any]:
     """Values for the template of a Python module; `array` is the hint of its arrays, between `quote` where it is no class."""
     robot, regrouping, closure = spec.robot, spec.regrouping, close(spec.robot)
     formulas = [(b.name, b.formula) for b in regrouping.base if b.name != b.own]

@@ -76,7 +76,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     values["regressor"], coefficients = _signals(regrouping, values["regressor"])
     blocks = {name: _block(regrouping, spec.functions[name].model, entries) for name, entries in values.items()}
     base = context(spec, command, LANGUAGE, "Array", '"')
-    formulas: Sequence[str] = base["formulas"]  # type: ignore[assignment]
+    formulas: Sequence[str] = base["formulas"]
     return laid_out(
         "xp.py",
         {

@@ -88,7 +88,8 @@ class Printer(Generic[T]):
         return self.sum([(c > 0, self._term(m, abs(c))) for m, c in e.ordered]) if e else self.number("0")
 
     def _term(self, m: Monomial, c: Fraction) -> T:
-        up, down = [], []
+        up: list[T] = []
+        down: list[T] = []
         for a, n in m:
             inverse = isinstance(a, Call) and a.function == "inv"
             (up if (n > 0) != inverse else down).append(self._power(a, abs(n)))

@@ -17,8 +17,8 @@ from oracles.random_robots import random_robot
 from runtime import load_model
 from symgen.derive.lagrange import Lagrange
 from symgen.description import load_robot, packaged_robots
-from symgen.emit.certified import CertificateError, certified_files, certify, model
 from symgen.emit import importing
+from symgen.emit.certified import CertificateError, certified_files, certify, model
 from symgen.emit.generate import generate_files, generate_module
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import regroup
