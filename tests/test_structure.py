@@ -49,10 +49,6 @@ ONLY_IN = {  # library: files and folders that may import it
     "scipy": ("runtime/",),
 }
 LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be mended, then empty
-    "symgen.demo.demonstration": {"symgen.cli.session"},
-    "symgen.demo.haptic": {f"symgen.cli.{name}" for name in ("session", "writing", "identify", "pages", "resolution_files")},
-    "symgen.demo.simulated_record": {"symgen.cli.session"},
-    "symgen.demo.tx40": {f"symgen.cli.{name}" for name in ("session", "writing", "identify", "pages", "resolution_files")},
 }
 FORBIDDEN_CALLS = {"eval", "exec", "sympify", "parse_expr", "__import__"}
 

@@ -131,6 +131,45 @@ class Checklist:
         return {"state": self.state, "answer": self.answer, "use": self.use, "doubt": self.doubt, "next": self.next, "checks": checks}
 
 
+def checklist_of(
+    estimate: Estimate,
+    fit: Estimate,
+    use: str,
+    *,
+    bootstrap: Mapping[str, float],
+    prediction_error: float,
+    negative: Sequence[str] = (),
+    feasibility: Feasibility | None = None,
+    advice: Advice | None = None,
+) -> Checklist:
+    """The checklist of an identification; rank alone where the record does not determine the parameters.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        All parameters.
+    fit : Estimate
+        The parameters that stand for the robot.
+    use : str
+        What they explain, in one sentence.
+    bootstrap : mapping of str to float
+        Deviations by name from blocks of time drawn again; parameters that it lacks have the corrected deviation.
+    prediction_error : float, %
+        Largest relative error of `fit` on data that did not give it; nan where there are none.
+    negative : sequence of str
+        Frictions and motor inertias certainly below zero.
+    feasibility : Feasibility, optional
+        Whether a physical robot can have the parameters.
+    advice : Advice, optional
+        The coarsest encoders, and the step in use.
+    """
+    checks = [determined(estimate, fit)]
+    if estimate.status != "rank-deficient":
+        checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error)]
+        checks += [signs(negative), certain(fit, bootstrap), separate(fit), physical(estimate, feasibility), resolved(advice)]
+    return Checklist(tuple(checks), use)
+
+
 def determined(estimate: Estimate, fit: Estimate) -> Check:
     """Rank and condition of W with all columns (`estimate`) and with those of the model (`fit`)."""
     question, limit = "Does the record determine the parameters?", f"full rank, condition number below {COND:g} with unit columns"
@@ -192,7 +231,7 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
 
 
 def predicted(fit: Estimate, error: float) -> Check:
-    """error : the largest relative error in % on data that did not give the parameters; nan where there are none."""
+    """Largest relative error, %, on data that did not give the parameters; open where it is nan."""
     limits = [max(times * fit.relative_error, least) for times, least in PREDICTION]
     return Check(
         "Does it predict data it has not seen?",
@@ -212,10 +251,7 @@ def signs(negative: Sequence[str]) -> Check:
 
 
 def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Check:
-    """Deviations without the assumption of independent residuals.
-
-    bootstrap : deviation by name from blocks drawn again; parameters that it lacks have the corrected one.
-    """
+    """Deviations without the assumption of independent residuals; bootstrap : as for `checklist_of`."""
     deviations = np.fmax(fit.sigma_corrected, [bootstrap.get(name, np.nan) for name in fit.names])
     with np.errstate(divide="ignore", invalid="ignore"):
         percent = 100 * np.where(np.isfinite(deviations), deviations, fit.sigma) / np.abs(fit.X)

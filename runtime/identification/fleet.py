@@ -21,7 +21,7 @@ from runtime import distributed, parallel
 from runtime.errors import InputError
 from runtime.identification.identification import identify
 from runtime.identification.result import Identification
-from runtime.estimators.estimate import json_text
+from runtime.json_documents import json_text
 from runtime.model.generated import GeneratedModel, ModelText, load_model
 from runtime.records.datasets import DATASETS
 from runtime.records.named import study_of

@@ -12,14 +12,13 @@ from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.methods import LINEAR
 from runtime.estimators.physical import negative_elements
-from runtime.identification import checklist
-from runtime.identification.checklist import Checklist, lost_joints
+from runtime.identification.checklist import Checklist, checklist_of, lost_joints
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.payload_study import PayloadStudy
 from runtime.identification.record_errors import RecordError, record_errors
 from runtime.identification.uncertainty import Uncertainty
 from runtime.identification.validation import Comparison, CrossValidation, WeakDirections
-from runtime.estimators.estimate import json_text
+from runtime.json_documents import json_text
 from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import Observation
@@ -164,15 +163,17 @@ class Identification:
     @cached_property
     def checklist(self) -> Checklist:
         """Whether the values can be used, question by question."""
-        checks = [checklist.determined(self.estimate, self.model_estimate)]
-        if self.determined:
-            fit, drawn = self.model_estimate, self.uncertainty.bootstrap
-            bootstrap = dict(zip(drawn.names, drawn.drawn, strict=True)) if self.model_columns == "essential" else {}
-            error = max(self._prediction_errors(self.validation), default=float("nan"))
-            checks += [checklist.explained(fit), *checklist.explained_by_joint(self.estimate, fit), checklist.predicted(fit, error)]
-            checks += [checklist.signs(self.negative), checklist.certain(fit, bootstrap), checklist.separate(fit)]
-            checks += [checklist.physical(self.estimate, self.feasibility), checklist.resolved(self.advice)]
-        return Checklist(tuple(checks), self.verdict)
+        drawn = self.uncertainty.bootstrap
+        return checklist_of(
+            self.estimate,
+            self.model_estimate,
+            self.verdict,
+            bootstrap=dict(zip(drawn.names, drawn.drawn, strict=True)) if self.model_columns == "essential" else {},
+            prediction_error=max(self._prediction_errors(self.validation), default=float("nan")),
+            negative=self.negative if self.determined else (),
+            feasibility=self.feasibility,
+            advice=self.advice,
+        )
 
     @property
     def verdict(self) -> str:

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.io
 
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.estimate import json_text
+from runtime.json_documents import json_text
 from runtime.resolution.result import Cestac
 
 Array = np.ndarray

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from runtime.identification.fleet import Fleet
 from runtime.identification.result import Identification
-from runtime.estimators.estimate import json_text
+from runtime.json_documents import json_text
 from runtime.motion.result import Simulation
 from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays

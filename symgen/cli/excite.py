@@ -210,6 +210,6 @@ def excitation_files(
 
 def json_of(summary: dict[str, Any]) -> str:
     """Text of excitation.json."""
-    from runtime.estimators.estimate import json_text
+    from runtime.json_documents import json_text
 
     return json_text(summary)

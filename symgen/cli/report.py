@@ -34,7 +34,7 @@ def report(
     with reported_errors(), reserved(output) as results:
         import runtime
         from runtime.identification.assessment import assess
-        from runtime.estimators.estimate import json_text
+        from runtime.json_documents import json_text
         from runtime.records.reading_by_blocks import records_or_streams
 
         model = session.model_of(robot)

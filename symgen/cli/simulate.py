@@ -28,7 +28,7 @@ def simulate(
     single_thread()
     with reported_errors(), reserved(output) as results:
         import runtime
-        from runtime.estimators.estimate import json_text
+        from runtime.json_documents import json_text
         from runtime.model.casadi import load_symbolic
 
         model = session.model_of(robot)

@@ -41,16 +41,16 @@ def read_and_derive(path: Path) -> object:
 
 def read_study(path: Path) -> object:
     from runtime.settings.files import load_study
+    from runtime.settings.location import located, study_text
     from runtime.settings.study import to_mapping
-    from symgen.cli.session import study_text
 
     study = load_study(path)
     to_mapping(study)
-    return study_text(study, path.parent, path.parent)
+    return study_text(located(study, path.parent), path.parent)
 
 
 def read_fleet(path: Path) -> object:
-    from symgen.cli.fleet_jobs import jobs_of
+    from runtime.identification.fleet import jobs_of
 
     return jobs_of(path)
 
