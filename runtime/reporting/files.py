@@ -8,12 +8,14 @@ from functools import singledispatch
 from pathlib import Path
 from typing import TypeAlias
 
+from runtime.excitation.search import Excitation
 from runtime.identification.fleet import Fleet
 from runtime.identification.result import Identification
 from runtime.json_documents import json_text
 from runtime.motion.result import Simulation
 from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays
+from runtime.reporting.excitation import excitation_page, motion_figure
 from runtime.reporting.friction import friction_figure
 from runtime.reporting.page import Section, render
 from runtime.reporting.pages import advice_page, identification_page, resolution_page
@@ -26,6 +28,7 @@ from runtime.resolution.result import Cestac
 from runtime.result_files import Results, write_all
 from runtime.settings.location import study_text
 from runtime.settings.study import RecordSettings, Study
+from runtime.settings.yaml import yaml_text
 
 Files: TypeAlias = dict[str, str | bytes]
 
@@ -34,12 +37,12 @@ ONE_BLOCK = 40
 """Lines of parameters.tex that one page holds; more stand in two blocks."""
 
 
-def report(result: Identification | Cestac | Advice | Simulation | Fleet, folder: str | Path | Results, *, study: Study | None = None) -> list[Path]:
+def report(result: Identification | Cestac | Advice | Simulation | Excitation | Fleet, folder: str | Path | Results, *, study: Study | None = None) -> list[Path]:
     """Write the page and the files of a result into a folder: all of them, or none.
 
     Parameters
     ----------
-    result : Identification, Cestac, Advice, Simulation or Fleet
+    result : Identification, Cestac, Advice, Simulation, Excitation or Fleet
     folder : str, Path or Results
         Made where it is missing; or one that this process keeps for itself (`runtime.result_files.reserved`).
     study : Study, optional
@@ -63,7 +66,7 @@ def report(result: Identification | Cestac | Advice | Simulation | Fleet, folder
 @singledispatch
 def files_of(result: object, folder: Path, study: Study) -> Files:
     """Contents of `folder` by file name; TypeError for a result without files."""
-    raise TypeError(f"{type(result).__name__} is no result that is written; expected an Identification, Cestac, Advice, Simulation or Fleet")
+    raise TypeError(f"{type(result).__name__} is no result that is written; expected an Identification, Cestac, Advice, Simulation, Excitation or Fleet")
 
 
 def identification_files(
@@ -124,6 +127,19 @@ def _(result: Simulation, folder: Path, study: Study) -> Files:
         "simulation.json": json_text(result.summary()),
         "simulation.svg": plots.svg(figure),
         "simulation.png": plots.png(figure),
+    }
+
+
+@files_of.register
+def _(result: Excitation, folder: Path, study: Study) -> Files:
+    """The motion as samples and by its coefficients, its figures of merit, the figure."""
+    figure = motion_figure(result)
+    return {
+        "report.html": render(excitation_page(result, plots.svg(figure))),
+        "excitation.json": json_text(result.summary()),
+        "trajectory.csv": result.to_csv(),
+        "motion.yaml": yaml_text({"motion": result.motion.to_mapping()}),
+        "motion.png": plots.png(figure),
     }
 
 
