@@ -29,7 +29,6 @@ T = TypeVar("T")
 LARGEST = 200_000_000  # bytes of a JSON result; that of 1000 parameters has 30 million
 KINDS = ("study", "estimate", "cestac")
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-NO_UNITS = ("or ", "tuple", "pair", "optional", '"')  # what stands behind the type of an entry of a docstring and is no unit
 LIMITS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}  # names of pydantic, of JSON Schema
 
 
@@ -181,13 +180,13 @@ class ResultSchema(SettingsSchema):
 
 
 def described(kind: type) -> tuple[str, dict[str, str]]:
-    """First paragraph of a docstring, and the text of every entry of its section Attributes, units in brackets; base classes included."""
+    """First paragraph of a docstring, and the text of every entry "name : type, unit" of its section Attributes, with its unit."""
     text, attributes = "", {}
     for cls in reversed(kind.__mro__):
         text, _, section = (inspect.cleandoc(cls.__dict__.get("__doc__") or "")).partition("\n\nAttributes\n----------\n")
         for names, form, meaning in re.findall(r"^(\w[\w, ]*) : (.*)\n((?:    .*\n?)*)", section, re.MULTILINE):
-            units = [part for part in re.split(r", (?![^(]*\))", form)[1:] if not part.startswith(NO_UNITS)]
-            entry = " ".join(meaning.split()) + (f" [{', '.join(units)}]" if units else "")
+            unit = form.partition(", ")[2]
+            entry = " ".join(meaning.split()) + (f" [{unit}]" if unit else "")
             attributes.update(dict.fromkeys(names.split(", "), entry))
     return " ".join(text.split("\n\n")[0].split()), attributes
 

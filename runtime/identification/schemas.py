@@ -126,7 +126,7 @@ class LevelDocument(LevelResult):
 
     Attributes
     ----------
-    runs : tuple of Run, or None
+    runs : tuple of Run or None
         The runs; null where there are more than a thousand.
     run_count : int
         Number of runs.
