@@ -94,11 +94,11 @@ def imports(name: str, *, at_run_time: bool = False) -> set[str]:
     return found
 
 
-def room(module: str) -> int:
-    """Place of a module in the order of its package; 0 for the ground, the last for the package itself."""
+def room(module: str) -> float:
+    """Place of a module in the order of its package; 0 for the ground. The package itself, the list of public names, stands before its users."""
     package, _, rest = module.partition(".")
     if not rest:
-        return len(ROOMS[package]) + 1
+        return ROOMS[package].index("demo") + 0.5 if "demo" in ROOMS[package] else len(ROOMS[package]) + 1
     first = rest.partition(".")[0]
     return ROOMS[package].index(first) + 1 if first in ROOMS[package] else 0
 

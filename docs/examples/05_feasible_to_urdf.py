@@ -1,4 +1,4 @@
-"""Parameters that a physical robot can have, written as a URDF (extra consistency)."""
+"""Parameters that a physical robot can have, written as a URDF."""
 
 import tempfile
 from pathlib import Path

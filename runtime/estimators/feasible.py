@@ -1,4 +1,4 @@
-"""Feasible least squares: the parameters nearest to the record that a physical robot can have (extra `consistency`).
+"""Feasible least squares: the parameters nearest to the record that a physical robot can have.
 
     min ||R (z - K chi)||^2 + weight D(chi)      subject to  P_j(chi) >= margin 1, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
@@ -37,7 +37,7 @@ from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
 from runtime.estimators.linear import System, assemble
-from runtime.estimators.semidefinite import Distance, Found, Rows, closest, everything
+from runtime.estimators.semidefinite import Distance, Optimum, Rows, closest, everything
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import PhysicalModel, physical_model
 from runtime.observation.qr_factor import Array, Factor, factor
@@ -191,7 +191,7 @@ def fitted(R: Array, z: Array, physical: PhysicalModel, options: FeasibleOptions
     rows, space = limit_rows(physical, options), everything(scales(physical))
     pull = pulled(physical, options.prior, weight)
 
-    def attempt(within: Rows) -> Found:
+    def attempt(within: Rows) -> Optimum:
         return closest(R, z, physical.conditions, within, space, least=options.margin, pull=pull)
 
     found = attempt(rows)

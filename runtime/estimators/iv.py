@@ -158,6 +158,6 @@ def _by_block(seen: Observation, Z: Array, residual: Array, A: Array) -> Array:
 
     Z, residual : weighted rows of the instruments, shape (r, b), and Y - W X, shape (r,).
     """
-    R = np.linalg.qr(Z, mode="r")
+    R = np.asarray(np.linalg.qr(Z, mode="r"))
     U = deletions(split_rows(np.column_stack([Z, residual]), seen.blocks()), np.zeros(Z.shape[1]), np.linalg.inv(R), A @ R.T)
     return U if len(U) > 1 else np.full_like(U, np.nan)

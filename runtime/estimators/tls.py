@@ -58,7 +58,7 @@ class TlsOptions(Settings):
     ----------
     position_error : float, rad or m
         Deviation of one raw position on the side cestac.side.
-    torque_error : float, tuple of float, or None, N m or N
+    torque_error : float or tuple of float or None, N m or N
         Deviation t_j of the torque of each joint; default: from the residuals.
     bootstrap : int
         Resampled records behind `sigma`; 0: that of least squares.

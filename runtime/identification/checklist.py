@@ -285,7 +285,7 @@ def physical(estimate: Estimate, feasibility: Feasibility | None) -> Check:
     if "standard" in estimate.details:
         return Check(question, "good", "Yes: they were fitted under these conditions", limit)
     if feasibility is None:
-        remedy = "pip install symgen[consistency], then symgen report, or symgen identify --physical"
+        remedy = "symgen report, or symgen identify --physical"
         return Check(question, "open", "Not asked", limit, remedy)
     if feasibility.feasible:
         return Check(question, "good", f"Yes, margin {feasibility.margin:.2g}", limit)

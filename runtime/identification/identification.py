@@ -64,7 +64,7 @@ def identify(
     simulator : Simulator, optional
         The closed loop, which iv, didim and cloe need; default: that of study.controller, with the CasADi module that lies with `model`.
     physical : bool
-        Whether a physical robot can have the parameters (extra `consistency`).
+        Whether a physical robot can have the parameters.
     friction : bool
         Curves of friction against velocity, joint by joint.
     provenance : mapping, optional

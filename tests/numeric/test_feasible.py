@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import builtins
 from dataclasses import replace
 from pathlib import Path
 
+import clarabel
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -13,11 +13,12 @@ from scipy.optimize import minimize
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
 from runtime.errors import SettingsError
-from runtime.estimators.methods import estimate_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.feasibility import Ellipsoid, Limits, feasibility, limit_rows, standard_parameters
+from runtime.estimators.feasibility import Ellipsoid, Limits, feasibility, limit_rows, pulled, scales, standard_parameters
 from runtime.estimators.feasible import FeasibleOptions, linear, residual_norm, weighed
+from runtime.estimators.methods import estimate_of
 from runtime.estimators.physical import negative_elements
+from runtime.estimators.semidefinite import closest, everything
 from runtime.identification.validation import split_validation
 from runtime.model.generated import load_model
 from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
@@ -284,28 +285,53 @@ def test_needs_the_model_and_values_for_a_pull(arm) -> None:
         )
 
 
-def test_without_the_extra_one_line_says_so(arm, monkeypatch) -> None:
-    real = builtins.__import__
-
-    def without(name, *args, **kwargs):
-        if name == "cvxpy":
-            raise ImportError(name)
-        return real(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(InputError, match=r"pip install symgen\[consistency\]"):
-        estimate_of(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
-
-
 def test_a_solver_that_fails_is_told(arm, monkeypatch) -> None:
-    import cvxpy
+    """One step of the interior point method solves nothing."""
 
-    def fails(self, **settings):
-        raise cvxpy.error.SolverError("no")
+    whole = clarabel.DefaultSolver
 
-    monkeypatch.setattr(cvxpy.Problem, "solve", fails)
-    with pytest.raises(InputError, match=r"was not solved \(Clarabel failed\); try another margin"):
+    def impatient(*problem):
+        problem[-1].max_iter = 1
+        return whole(*problem)
+
+    monkeypatch.setattr("runtime.estimators.semidefinite.clarabel.DefaultSolver", impatient)
+    with pytest.raises(InputError, match=r"was not solved \(Clarabel: MaxIterations\); try another margin"):
         estimate_of(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
+
+
+@pytest.mark.parametrize("kind", ["euclidean", "entropic", "pullback"])
+def test_the_pull_is_at_its_minimum(arm, kind) -> None:
+    """Criterion written down from the definitions of the distances: no step towards another robot makes it smaller."""
+    physical = physical_model(arm)
+    prior = pulled(physical, kind, 1e-2)
+    rng = np.random.default_rng(3)
+    p = len(physical.standard)
+    R, z = rng.standard_normal((6, p)) / 3, rng.standard_normal(6) / 3
+    rows = limit_rows(physical, None)
+    chi = closest(R, z, physical.conditions, rows, everything(scales(physical)), least=1e-4, pull=prior).chi
+    links = [c for c in physical.conditions if c.name.startswith("link ")]
+
+    def criterion(x):
+        if kind == "euclidean":
+            numbers = list(prior.numbers)
+            distance = np.sum(((x - prior.chi0) / prior.scale)[numbers] ** 2)
+        else:
+            Ms = [np.linalg.solve(c.matrix(prior.chi0), c.matrix(x)) for c in links]
+            if kind == "entropic":
+                distance = sum(np.trace(M) - np.linalg.slogdet(M)[1] - 4 for M in Ms)
+            else:
+                distance = sum(np.trace((M - np.eye(4)) @ (M - np.eye(4))) / 2 for M in Ms)
+        return np.sum((R @ x - z) ** 2) + 1e-2 * distance
+
+    best, smallest = criterion(chi), min(physical.smallest(chi).values())
+    assert smallest > 1e-4 - 1e-9
+    tried = 0
+    for _ in range(2000):
+        inside = prior.chi0 * rng.uniform(0.5, 2) + scales(physical) * rng.normal(0, 10 ** rng.uniform(-4, -1), p)
+        if min(physical.smallest(inside).values()) >= 1e-4:
+            tried += 1
+            assert criterion(chi + 10 ** rng.uniform(-4, 0) * (inside - chi)) > best - 1e-10
+    assert tried > 50
 
 
 def test_essential_columns_alone_leave_the_others_free(arm) -> None:
