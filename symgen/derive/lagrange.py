@@ -170,8 +170,8 @@ class Lagrange:
         if e.kind == "offset":
             return np.broadcast_to(G, np.shape(q))
         sd = np.asarray(qd @ G)[..., None]
-        moves = {None: 1.0, "positive": sd > 0, "negative": sd < 0}[e.when]
-        return np.asarray((qd @ B if e.kind == "viscous" else np.sign(sd) * G) * moves)
+        force = np.asarray(qd @ B if e.kind == "viscous" else np.sign(sd) * G)
+        return force if e.when is None else force * (sd > 0 if e.when == "positive" else sd < 0)
 
     def torque(self, q: Array, qd: Array, qdd: Array, chi: Array) -> Array:
         """Gamma, (..., n)."""

@@ -42,7 +42,7 @@ def write_par(robot: Robot) -> tuple[str, tuple[str, ...]]:
         *(_row(key, column) for key, column in columns.items()),
         "",
         "(* Dynamic parameters and external forces *)",
-        *(_row(there, (_symbol(there, here, j, written) for j in range(1, NL + 1))) for there, here in FAMILIES.items()),
+        *(_row(name, (_symbol(name, family, j, written) for j in range(1, NL + 1))) for name, family in FAMILIES.items()),
         *(_row(key, ["0"] * NL) for key in WRENCH),
         "",
         "(* Joint parameters *)",
@@ -98,8 +98,8 @@ def _numbers(what: str, table: Mapping[str, float]) -> list[str]:
     return [f"(* {what}: " + ", ".join(f"{name} = {value!r}" for name, value in table.items()) + " *)"] if table else []
 
 
-def _symbol(there: str, here: str, j: int, written: set[str]) -> str:
-    return f"{there}{j}" if parameter(here, j) in written else "0"
+def _symbol(name: str, family: str, j: int, written: set[str]) -> str:
+    return f"{name}{j}" if parameter(family, j) in written else "0"
 
 
 def _losses(robot: Robot, written: set[str]) -> tuple[str, ...]:

@@ -29,7 +29,15 @@ STEEP = 0.02  # sine of the angle of two axes below which their common normal is
 
 @dataclass
 class Body:
-    """Body j while its frame is placed: links with their poses in it, joints it carries with the poses of their parent links."""
+    """Body j while its frame is placed.
+
+    Attributes
+    ----------
+    links : mapping
+        Pose (4, 4) of each of its links in frame j.
+    joints : list
+        Joints on it, each with the pose of its parent link in frame j.
+    """
 
     links: dict[str, Array]
     joints: list[tuple[Joint, Array]]
@@ -37,7 +45,21 @@ class Body:
 
 @dataclass
 class Table:
-    """The table as it grows: frames, values of the constants, joints and bodies by frame number, kept links by frame number."""
+    """The table as it grows.
+
+    Attributes
+    ----------
+    tree : Tree
+        What is turned into the table.
+    frames : list of Frame
+        Rows so far.
+    constants : mapping, m
+        Lengths by name.
+    joint, bodies, kept : mapping
+        Joint, body and kept link by frame number.
+    notes : list of str
+        What a reader should know of the table.
+    """
 
     tree: Tree
     frames: list[Frame] = field(default_factory=list)
@@ -52,11 +74,11 @@ def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
     """Frames of all bodies, a body before what it carries, branch by branch; then those of the links that fixed joints hold, if kept."""
     table = Table(tree)
     table.bodies[0] = _body(tree, tree.root, np.eye(4))
-    waiting = [(0, *carried) for carried in reversed(table.bodies[0].joints)]
+    waiting = [(0, joint, parent) for joint, parent in reversed(table.bodies[0].joints)]
     while waiting:
         ant, joint, parent = waiting.pop()
         j = _add(table, ant, joint, parent)
-        waiting += [(j, *carried) for carried in reversed(table.bodies[j].joints)]
+        waiting += [(j, child, link) for child, link in reversed(table.bodies[j].joints)]
     if keep_fixed:
         for j, body in table.bodies.items():
             for name, pose in list(body.links.items())[1:]:
@@ -88,7 +110,7 @@ def _body(tree: Tree, link: str, pose: Array) -> Body:
             else:
                 body.joints.append((joint, body.links[link]))
     order = {joint.name: k for k, joint in enumerate(tree.joints)}
-    body.joints.sort(key=lambda carried: order[carried[0].name])
+    body.joints.sort(key=lambda held: order[held[0].name])
     return body
 
 
@@ -109,10 +131,10 @@ def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
     theta = r = 0.0
     if body.joints:
         first, link = body.joints[0]
-        carried = link @ first.pose
-        along = carried[:3, :3] @ first.axis
+        placed_joint = link @ first.pose
+        along = placed_joint[:3, :3] @ first.axis
         if not _nearly_parallel(along):
-            theta, r, _, _ = _normal(along, carried[:3, 3])
+            theta, r, _, _ = _normal(along, placed_joint[:3, 3])
             theta, r = _numbered((theta, r))
     sigma = PRISMATIC if joint.kind == "prismatic" else REVOLUTE
     _, j = _row(table, ant, sigma, before, theta, r)
@@ -181,7 +203,7 @@ def _row(table: Table, ant: int, sigma: int, before: Sequence[float], theta: flo
 
 
 def _length(table: Table, name: str, x: float) -> Expression:
-    """0, or a constant of this value, the one that is there already if it is equal."""
+    """0, or a constant of this value: an earlier one if it is equal."""
     if abs(x) <= SAME:
         return ZERO
     known = next((k for k, value in table.constants.items() if abs(abs(value) - abs(x)) <= SAME), None)

@@ -28,14 +28,20 @@ def read_urdf(content: bytes, file: str, *, nearly: float = 0.0, keep_fixed: boo
 
     Parameters
     ----------
-    content, file : bytes and name of the file.
-    nearly : rad; angles of the file this close to a multiple of pi/12 are taken as that, 1e-4 for files that say 1.5708.
-    keep_fixed : links held by fixed joints (tool0, flange) are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else they
-        are only part of the body that holds them, to which their inertia belongs either way.
+    content : bytes
+        Of the file.
+    file : str
+        Its name.
+    nearly : float, rad
+        Angles of the file this close to a multiple of pi/12 are taken as that: 1e-4 for files that say 1.5708.
+    keep_fixed : bool
+        Links held by fixed joints (tool0, flange) are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else they
+        are only part of the body that holds them. Their inertia belongs to that body either way.
 
     Raises
     ------
-    DescriptionError : no URDF, or no tree of revolute, prismatic and fixed joints; names file and line.
+    DescriptionError
+        No URDF, or no tree of revolute, prismatic and fixed joints; the message names file and line.
     """
     try:
         return robot_of_tree(parse_urdf(content, nearly), file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
@@ -73,19 +79,21 @@ def parse_urdf(content: bytes, nearly: float = 0.0) -> Tree:
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Relation]:
     """q = multiplier q_leader + offset of the joints that mimic another, through any that follow each other."""
     moving = {joint.name for joint in joints if joint.kind != FIXED_TYPE}
-    found: dict[str, Relation] = {}
+    relations: dict[str, Relation] = {}
     for joint in (joint for joint in joints if joint.name in mimics):
-        leader, multiplier, offset, seen = joint.name, Fraction(1), Fraction(0), {joint.name}
+        leader, multiplier, offset, followed = joint.name, Fraction(1), Fraction(0), {joint.name}
         while leader in mimics:
             leader, factor, shift = mimics[leader]
-            if leader in seen or leader not in moving:
-                what = "joints follow each other in a circle" if leader in seen else f"there is no moving joint {leader[:60]!r} to follow"
+            if leader in followed or leader not in moving:
+                what = (
+                    "joints follow each other in a circle" if leader in followed else f"there is no moving joint {leader[:60]!r} to follow"
+                )
                 raise DescriptionError(f"joint {joint.name!r}: {what}", line=joint.line)
-            seen.add(leader)
+            followed.add(leader)
             offset += multiplier * Fraction(repr(shift))
             multiplier *= Fraction(repr(factor))
-        found[joint.name] = Relation({leader: multiplier}, offset)
-    return found
+        relations[joint.name] = Relation({leader: multiplier}, offset)
+    return relations
 
 
 def _pose(e: Element | None, nearly: float) -> Array:

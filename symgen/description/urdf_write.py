@@ -27,13 +27,16 @@ def write_urdf(robot: Robot, values: Mapping[str, float] | None = None) -> tuple
 
     Parameters
     ----------
-    robot : without loops; passive joints follow one joint each.
-    values : standard parameters by name, those of the robot file if None. A URDF holds masses, so they must be those of a physical robot:
+    robot : Robot
+        Without loops; passive joints follow one joint each.
+    values : mapping, SI, optional
+        Standard parameters by name; those of the robot file where left out. A URDF holds masses, so they must be those of a physical robot:
         of a feasible estimate, or CAD.
 
     Raises
     ------
-    DescriptionError : loops, relations of several joints, inertial parameters without value, moments without mass.
+    DescriptionError
+        Loops, relations of several joints, inertial parameters without value, moments without mass.
     """
     values = dict(robot.values if values is None else values)
     if robot.loops:
@@ -93,7 +96,7 @@ def _joint(robot: Robot, f: Frame, values: Mapping[str, float]) -> list[str]:
         return [*lines, "  </joint>"]
     lines += ['    <axis xyz="0 0 1"/>', f"    <limit {_attributes(**_limit(robot, f))}/>"]
     own = one_joint_parameters(robot, _DYNAMICS)
-    dynamics = {there: values[name] for family, there in _DYNAMICS.items() if (name := parameter(family, f.j)) in own & set(values)}
+    dynamics = {key: values[name] for family, key in _DYNAMICS.items() if (name := parameter(family, f.j)) in own & set(values)}
     if dynamics:
         lines.append(f"    <dynamics {_attributes(**dynamics)}/>")
     if f.j in robot.constraints:
@@ -114,7 +117,7 @@ def _limit(robot: Robot, f: Frame) -> dict[str, float]:
         bounds = {"lower": ends[0], "upper": ends[1]}
     elif f.sigma == PRISMATIC:
         bounds = {"lower": -UNLIMITED, "upper": UNLIMITED}
-    largest = {there: row.get(here, UNLIMITED) for here, there in (("qd", "velocity"), ("tau", "effort"))}
+    largest = {written: row.get(key, UNLIMITED) for key, written in (("qd", "velocity"), ("tau", "effort"))}
     return bounds | {key: x for key, x in largest.items() if not isinstance(x, tuple)}
 
 
