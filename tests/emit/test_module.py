@@ -135,7 +135,7 @@ def test_titles_stay_text(title: str) -> None:
     assert code(generate_module(without_hash(hostile))) == code(generate_module(without_hash(plain)))
 
 
-@pytest.mark.parametrize("constant", ["C2", "W12", "VP13", "S2"])
+@pytest.mark.parametrize("constant", ["C2", "W12", "VP13", "S2", "states", "GAM", "T"])
 def test_a_constant_named_as_a_quantity_is_refused(constant: str) -> None:
     with pytest.raises(SymgenError, match=constant):
         generate_module(arm(constant=constant))
@@ -197,6 +197,15 @@ def test_jacobian_and_elements_are_those_of_the_constants_given() -> None:
     step, h = np.array([0.3, -0.7]), 1e-6
     ahead, behind = (module.frame_poses(q + sign * h * step, KR=2.0)[:, -1, :3, 3] for sign in (1, -1))
     assert np.allclose((ahead - behind) / (2 * h), module.jacobian(q, KR=2.0)[:, :3] @ step, atol=1e-8)
+
+
+def test_constants_of_paths_may_be_called_as_locals() -> None:
+    """P, J, v are names of lengths and ratios as well."""
+    q = states(2, 5)[0]
+    expected = loaded(parse_robot(GEARED.encode(), "geared.yaml")).jacobian(q)
+    for name in ("P", "J", "v", "k", "rate", "path"):
+        renamed = GEARED.replace("KR", name)
+        assert np.array_equal(loaded(parse_robot(renamed.encode(), "geared.yaml")).jacobian(q), expected), name
 
 
 ONE = """
