@@ -75,7 +75,7 @@ def two_joints() -> object:
 def read_record(path: Path) -> object:
     """Whole and, where the format has it, by blocks: both give the same samples or both refuse."""
     from runtime.errors import InputError
-    from runtime.records.formats.table import BLOCK_READERS
+    from runtime.records.formats.table import format_of
     from runtime.records.reading import read_record as read
     from runtime.records.reading_by_blocks import open_stream
     from runtime.settings.study import RecordSettings
@@ -87,12 +87,12 @@ def read_record(path: Path) -> object:
         whole = read(settings, folder=path.parent)
     except InputError as e:
         refused = e
-    if path.suffix in BLOCK_READERS:
+    if format_of(path).by_blocks and path.suffix != ".gz":
         try:
             stream = open_stream(settings, folder=path.parent, block=10)
             blocks = [q for _, q, _ in stream.blocks()]
         except InputError:
-            if refused is None and path.suffix in (".csv", ".npy"):
+            if refused is None:
                 raise
         else:
             if refused is None and not np.array_equal(np.concatenate(blocks), whole.q):  # type: ignore[attr-defined]

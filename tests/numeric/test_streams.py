@@ -154,7 +154,7 @@ def test_bad_files(tmp_path, samples):
     with pytest.raises(InputError, match="columns of different lengths: q1 1003, q2 1002"):
         open_stream(replace(given, rate=RATE), folder=tmp_path)
     np.savez(path, q1=np.array([{}], dtype=object))
-    with pytest.raises(InputError, match="not an archive of plain arrays .q1 holds pickled objects"):
+    with pytest.raises(InputError, match=r"not an archive of plain arrays \(q1 holds pickled objects"):
         open_stream(replace(given, rate=RATE), folder=tmp_path)
     with pytest.raises(InputError, match="no such file"):
         open_stream(RecordSettings(files=("nothing.csv",)), folder=tmp_path)

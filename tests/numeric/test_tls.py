@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 from runtime.errors import SettingsError
 from runtime.estimators.methods import estimate_of
-from runtime.identification.identification import identification
+from runtime.identification.identification import identify
 from runtime.model.generated import load_model
 from runtime.observation.observation import observe, stack
 from runtime.observation.position_errors import with_errors
@@ -147,8 +147,8 @@ def test_errors_assumed_that_hide_the_parameters_are_declined():
 def test_whole_identification(tmp_path):
     """errors travel through stacking, essential columns and windows."""
     study = replace(STUDY, estimate=tls(position_error=1e-5))
-    found = identification(EMPS, study, [axis(1, 1e-5), axis(2, 1e-5)], provenance={"simulated": True})
-    assert found.chosen.method == "tls" and found.chosen["M1R"] == pytest.approx(95, rel=0.02)
+    found = identify(EMPS, [axis(1, 1e-5), axis(2, 1e-5)], study, provenance={"simulated": True})
+    assert found.estimate.method == "tls" and found.estimate["M1R"] == pytest.approx(95, rel=0.02)
     one, other = rows(1, 1e-5), rows(2, 1e-5)
     both = stack([one, other])
     assert np.allclose(both.errors, (one.errors * one.rows[0] + other.errors * other.rows[0]) / both.rows[0])
