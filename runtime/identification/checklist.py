@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from runtime.estimators.methods import CLOSED_LOOP
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import CLOSED_LOOP
 from runtime.estimators.physical import CERTAIN
 from runtime.identification.validation import CORRELATION
 from runtime.resolution.advice import Advice, step_text

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TypeAlias
+from typing import TypeAlias, overload
 
 import numpy as np
 
-from runtime.estimators.methods import CLOSED_LOOP, estimate_of, linear_companion, point_estimate
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import CLOSED_LOOP, estimate_of, linear_companion, point_estimate
 from runtime.model.drives import Coupling, Drives
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import Observation
@@ -44,6 +44,10 @@ def coupling_fits(model: GeneratedModel, records: Sequence[Record | Stream], stu
     return fits
 
 
+@overload
+def recoupled(record: Record, used: Drives, wanted: Drives) -> Record: ...
+@overload
+def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record | Stream: ...
 def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record | Stream:
     """The record as the drives `wanted` would have turned its motor side into the joint side; `used` are those it was read with."""
 

@@ -1,8 +1,8 @@
 """The identification of one robot from its records: one call, with everything a report says about it.
 
-    model, records, study -> Y = W X + rho -> all parameters, eqs. (7)-(11), and the essential ones
-                          -> measured beside predicted torques, windows of the records against each other, parameters that trade, coupling
-                          -> where they are asked for: a load, feasibility, friction curves
+model, records, study -> Y = W X + rho -> all parameters, eqs. (7)-(11), and the essential ones
+                      -> measured beside predicted torques, windows of the records against each other, parameters that trade, coupling
+                      -> where they are asked for: a load, feasibility, friction curves
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from runtime.errors import InputError
-from runtime.estimators.methods import LINEAR, estimate_of, linear_companion, simulator_of
-from runtime.estimators.methods import observed as method_observation
 from runtime.estimators.closed_loop import Simulator
 from runtime.estimators.essential import essential_of
+from runtime.estimators.methods import LINEAR, estimate_of, linear_companion, simulator_of
+from runtime.estimators.methods import observed as method_observation
 from runtime.identification.coupling import coupling_fits
 from runtime.identification.friction import friction_curves
 from runtime.identification.payload_study import payload_study

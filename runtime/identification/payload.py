@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.methods import estimate_of
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import estimate_of
 from runtime.estimators.solution import Solution, solve
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model

@@ -233,7 +233,9 @@ class Identification:
         return Table("Conditions of a physical robot", ("condition", "smallest eigenvalue", ""), rows)
 
     def _record_lines(self) -> list[str]:
-        return [f"error in {one.name}: {one.relative_error:.2f} % in total, per joint {_percents(one.per_joint)}" for one in self.record_errors]
+        return [
+            f"error in {one.name}: {one.relative_error:.2f} % in total, per joint {_percents(one.per_joint)}" for one in self.record_errors
+        ]
 
     def _direction_lines(self) -> list[str]:
         lines = [f"{d.ratio:.1e}  " + " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items()) for d in self.correlations.directions]
@@ -281,4 +283,3 @@ class Identification:
 
 def _percents(errors: tuple[float, ...]) -> str:
     return " ".join(f"{error:.2f}" for error in errors)
-

@@ -37,7 +37,9 @@ ONE_BLOCK = 40
 """Lines of parameters.tex that one page holds; more stand in two blocks."""
 
 
-def report(result: Identification | Cestac | Advice | Simulation | Excitation | Fleet, folder: str | Path | Results, *, study: Study | None = None) -> list[Path]:
+def report(
+    result: Identification | Cestac | Advice | Simulation | Excitation | Fleet, folder: str | Path | Results, *, study: Study | None = None
+) -> list[Path]:
     """Write the page and the files of a result into a folder: all of them, or none.
 
     Parameters
@@ -66,7 +68,9 @@ def report(result: Identification | Cestac | Advice | Simulation | Excitation | 
 @singledispatch
 def files_of(result: object, folder: Path, study: Study) -> Files:
     """Contents of `folder` by file name; TypeError for a result without files."""
-    raise TypeError(f"{type(result).__name__} is no result that is written; expected an Identification, Cestac, Advice, Simulation, Excitation or Fleet")
+    raise TypeError(
+        f"{type(result).__name__} is no result that is written; expected an Identification, Cestac, Advice, Simulation, Excitation or Fleet"
+    )
 
 
 def identification_files(

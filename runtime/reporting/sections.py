@@ -73,7 +73,9 @@ def joint_section(result: Identification) -> Section:
         (a.joint, str(a.rows), number(a.relative_error, ".2f"), number(b.relative_error, ".2f"), number(b.sigma_rho))
         for a, b in zip(fit.per_joint, essential.per_joint, strict=True)
     ]
-    rows.append(("total", str(fit.rows), number(fit.relative_error, ".2f"), number(essential.relative_error, ".2f"), number(essential.sigma_rho)))
+    rows.append(
+        ("total", str(fit.rows), number(fit.relative_error, ".2f"), number(essential.relative_error, ".2f"), number(essential.sigma_rho))
+    )
     text = (
         f"{fit.rows} rows, {len(fit.names)} parameters, rank {fit.rank}; condition number of W {number(fit.cond)}, {number(fit.cond_unit)} "
         f"with columns of norm 1. Residual norm {number(fit.residual_norm, '.6g')} with all parameters, {number(essential.residual_norm, '.6g')} with the "
@@ -87,7 +89,8 @@ def record_section(result: Identification) -> Section:
     """Errors of each of several records, and what their time stamps were like."""
     header = ("record", "rows", "error %", *(f"joint {joint.joint}" for joint in result.model_estimate.per_joint))
     rows = [
-        (one.name, str(one.rows), number(one.relative_error, ".2f"), *(number(e, ".2f") for e in one.per_joint)) for one in result.record_errors
+        (one.name, str(one.rows), number(one.relative_error, ".2f"), *(number(e, ".2f") for e in one.per_joint))
+        for one in result.record_errors
     ]
     tables = [Table("Relative error by record and joint, %", header, rows)] if rows else []
     return Section("Records", result.time_stamps, tables=tables)

@@ -21,10 +21,20 @@ def simulation_figure(joints: Sequence[int], simulation: Simulation, units: Sequ
         figure, axes = panels_figure(len(joints), 3, (10.5, 1.6 * len(joints) + 0.8))
         for row, (j, (position, torque)) in enumerate(zip(joints, units, strict=True)):
             motion, error, effort = axes[3 * row : 3 * row + 3]
-            _lines(motion, simulation.t, f"q{j}, {position}", (simulation.q_r[:, row], GREY, "reference"), (simulation.q[:, row], BLUE, "simulated"))
+            _lines(
+                motion,
+                simulation.t,
+                f"q{j}, {position}",
+                (simulation.q_r[:, row], GREY, "reference"),
+                (simulation.q[:, row], BLUE, "simulated"),
+            )
             _lines(error, simulation.t, f"q{j} - qr{j}, {position}", (simulation.q[:, row] - simulation.q_r[:, row], ORANGE, ""))
             _lines(
-                effort, simulation.t, f"torque {j}, {torque}", (simulation.tau_measured[:, row], GREY, "recorded"), (simulation.tau[:, row], BLUE, "exact")
+                effort,
+                simulation.t,
+                f"torque {j}, {torque}",
+                (simulation.tau_measured[:, row], GREY, "recorded"),
+                (simulation.tau[:, row], BLUE, "exact"),
             )
         for ax in axes[-3:]:
             ax.set_xlabel("time, s")

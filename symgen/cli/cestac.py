@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -57,22 +57,23 @@ def cestac(
         model = session.model_of(robot, "numpy" if advise else target)
         study = session.with_cestac(session.study_of_arguments(record), **given, columns=session.names_of(columns))
         records = read_records(study.record, model)
-        sources, checkpoint = origin(records), None if output is None or advise else Checkpoint(output)
+        checkpoint = None if output is None or advise else Checkpoint(output)
+        result: runtime.Cestac | runtime.Advice
         try:
             with session.progress_bar("encoders" if advise else "runs") as progress:
+                shared: dict[str, Any] = {"progress": progress, "provenance": origin(records)}
                 if advise:
-                    steps = study.cestac.delta if delta else ()
-                    advice = runtime.advise(model, records, study, asked=steps, progress=progress, provenance=sources)
-                    result, text, negative = advice, f"{advice.to_table()}\n\n{advice.verdict}", advice.negative
+                    result = advice = runtime.advise(model, records, study, asked=study.cestac.delta if delta else (), **shared)
+                    text, negative = f"{advice.to_table()}\n\n{advice.verdict}", advice.negative
                 else:
-                    options = {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint}
-                    result = runtime.cestac(model, records, study, **options, progress=progress, provenance=sources)
-                    text, negative = resolution_text(result), result.verdict == "biased"
+                    shared |= {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint}
+                    result = resolution = runtime.cestac(model, records, study, **shared)
+                    text, negative = resolution_text(resolution), resolution.verdict == "biased"
         except KeyboardInterrupt:
             session.stopped(checkpoint)
         if results is not None:
             runtime.report(result, results, study=study)
-        if checkpoint is not None and result.lists_runs:
+        if checkpoint is not None and isinstance(result, runtime.Cestac) and result.lists_runs:
             checkpoint.remove()
         session.show(result.to_json() if json else text, output, json=json)
     if negative:

@@ -42,8 +42,9 @@ def fleet(
             typer.echo(f"{done} of {total}  {job.row.name}: {job.row.status}", err=True)
 
         files = None if output is None else identification_files
-        given = {"folder": output or "", "files": files, "workers": workers, "scheduler": scheduler}
-        result = identify_fleet(file, load=_model, finished=finished, **given)
+        result = identify_fleet(
+            file, load=_model, folder=output or "", files=files, workers=workers, scheduler=scheduler, finished=finished
+        )
         if results is not None:
             runtime.report(result, results)
         typer.echo(result.to_json() if json else result.to_text(), nl=not json)

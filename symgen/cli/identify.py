@@ -26,9 +26,7 @@ def identify(
         int | None,
         typer.Option(min=10, help="Read the records by blocks of so many samples; default: for large files, or as the study says."),
     ] = None,
-    physical: Annotated[
-        bool, typer.Option("--physical", help="Tell whether a physical robot can have these parameters.")
-    ] = False,
+    physical: Annotated[bool, typer.Option("--physical", help="Tell whether a physical robot can have these parameters.")] = False,
     friction: Annotated[
         bool, typer.Option("--friction", help="Friction against velocity, joint by joint, and the law it follows.")
     ] = False,

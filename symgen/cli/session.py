@@ -105,7 +105,7 @@ def _in_c(model: GeneratedModel, robot: str | None) -> GeneratedModel:
     source = None
     if robot is not None:
         from symgen.description import load_robot
-        from symgen.emit import generate_files
+        from symgen.emit.generate import generate_files
         from symgen.emit.importing import stored_path
 
         ((name, text),) = generate_files(load_robot(robot), targets=("c",)).items() or [(f"{model.NAME}.c", "")]

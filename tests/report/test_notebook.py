@@ -48,7 +48,12 @@ def test_estimate_is_a_table():
     shown = fit()._repr_html_()
     ElementTree.fromstring(shown)
     page = Elements(shown)
-    assert "<var>ZZ<sub>1R</sub></var>" in shown and "kg\xa0m²" in page.text and "10.000" in page.text and "relative error 2.500 %" in page.text
+    assert (
+        "<var>ZZ<sub>1R</sub></var>" in shown
+        and "kg\xa0m²" in page.text
+        and "10.000" in page.text
+        and "relative error 2.500 %" in page.text
+    )
     assert {tag for tag, _ in page.tags} <= {
         "div",
         "p",
