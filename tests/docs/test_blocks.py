@@ -25,7 +25,7 @@ from ruamel.yaml import YAML
 from typer.main import get_command
 
 from runtime.settings.files import settings_from_text, study_from_text
-from symgen.cli.fleet_jobs import FleetSettings
+from runtime.identification.fleet import FleetSettings
 from symgen.cli.main import app
 from symgen.description.schema import RobotFile
 
