@@ -11,9 +11,11 @@ from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 from scipy.signal import lfilter
 
 from runtime.errors import SettingsError
+from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.methods import LINEAR, METHODS, estimate_of, linear_system
 from runtime.estimators.solution import null_groups, solve
 from runtime.observation.qr_factor import combine, factor
+from runtime.observation.system import split_rows
 from runtime.settings.study import EstimateSettings
 
 EVERY = [OLS, WLS, EstimateSettings(method="wls", weights="iterated"), EstimateSettings(method="wls", weights="covariance")]
@@ -111,6 +113,41 @@ def test_corrected_sigma_follows_correlated_residuals():
     corrected = np.mean([fit.sigma_corrected for fit in fits], axis=0)
     assert (scatter / stated).max() > 1.6
     assert np.all(scatter / corrected < 1.35) and np.all(scatter / corrected > 0.75)
+
+
+def test_corrected_sigma_with_as_many_parameters_as_blocks():
+    """60 parameters, 50 blocks, residuals correlated by 0.8 from row to row: the jackknife states the scatter, blocks as they are 0.8 of it."""
+    rng = np.random.default_rng(11)
+    N, b, K, runs = 1000, 60, 50, 80
+    r, W = 2 * N, np.vstack([lfilter([1], [1, -0.9], rng.standard_normal((N, b)), axis=0) for _ in range(2)])
+    blocks, T = np.tile(np.repeat(np.arange(K), N // K), 2), np.linalg.inv(np.linalg.qr(W, mode="r"))
+    found, jackknife, plain = [], [], []
+    for _ in range(runs):
+        Y = lfilter([0.6], [1, -0.8], rng.standard_normal((2, N + 100)))[:, 100:].ravel()
+        X = T @ T.T @ (W.T @ Y)
+        found.append(X)
+        jackknife.append(np.diag(block_covariance(split_rows(np.column_stack([W, Y]), blocks), X, T)))
+        g = np.array([rows[:, :-1].T @ (rows[:, -1] - rows[:, :-1] @ X) for rows in split_rows(np.column_stack([W, Y]), blocks)]) @ T @ T.T
+        plain.append((g**2).sum(axis=0) * K / (K - 1) * (r - 1) / (r - b))
+    real = np.var(found, axis=0, ddof=1)
+    assert np.median(np.sqrt(np.mean(jackknife, axis=0) / real)) == pytest.approx(1.0, abs=0.1)
+    assert np.median(np.sqrt(np.mean(plain, axis=0) / real)) < 0.85
+
+
+def test_corrected_sigma_is_that_of_estimates_without_one_block():
+    """The jackknife from its definition, with the weights of the joints; nothing where one block alone determines a parameter."""
+    seen = observation(N=120, noise=(0.4, 0.03), seed=8)
+    settings = EstimateSettings("wls", options={"block": 0.5})
+    fit = estimate_of(seen, settings)
+    s, blocks = np.repeat([joint.scale for joint in fit.per_joint], 120), seen.blocks(0.5)
+    K = blocks.max() + 1
+    W, Y = seen.W / s[:, None], seen.Y / s
+    without = np.array([np.linalg.lstsq(W[blocks != k], Y[blocks != k], rcond=None)[0] for k in range(K)])
+    assert np.allclose(fit.sigma_corrected, np.sqrt((K - 1) / K * ((without - fit.X) ** 2).sum(axis=0)), rtol=1e-8)
+    W = seen.W.copy()
+    W[:, seen.names.index("FS2")] = np.where(blocks == 2, W[:, seen.names.index("FS2")], 0.0)
+    alone = estimate_of(replace(seen, W=W), settings)
+    assert np.isnan(alone.sigma_corrected).sum() == 1 and np.isnan(alone.sigma_corrected[alone.names.index("FS2")])
 
 
 def test_blocks_gather_all_joints_of_an_interval():

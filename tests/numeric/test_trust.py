@@ -1,6 +1,7 @@
 """Whiteness, drawn blocks, F-tests and sets by threshold: against scipy's own, against scatter, on residuals whose colour is known."""
 
 import json
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -54,6 +55,26 @@ def test_coloured_residuals_are_worth_fewer_rows():
     assert w.correlation[0] == pytest.approx(0.8, abs=0.02)
     assert w.effective_rows / w.rows == pytest.approx((1 - 0.8) / (1 + 0.8), rel=0.15)
     assert w.half < 2.0 and np.trapezoid(w.density, w.frequency) == pytest.approx(np.var(e), rel=0.05)
+
+
+def test_rows_that_count_over_a_long_memory():
+    """First order, 0.99 from row to row: (1 - 0.99)/(1 + 0.99) of 4000 rows are 20; 20 lags alone would say 111."""
+    rng = np.random.default_rng(4)
+    worth = [joint_whiteness(joint(lfilter([1], [1, -0.99], rng.standard_normal(6000))[2000:]), 30.0).effective_rows for _ in range(40)]
+    assert np.median(worth) == pytest.approx(20, rel=0.35)
+
+
+def test_records_a_month_apart_take_the_room_of_their_rows():
+    e = coloured(np.random.default_rng(5).standard_normal(2000))
+    t = np.arange(1000) / 125
+    month = 30 * 24 * 3600.0
+    tracemalloc.start()
+    apart = joint_whiteness(joint(e, np.concatenate([t, t + month]), 125.0), 125.0)
+    assert tracemalloc.get_traced_memory()[1] < 2e6
+    tracemalloc.stop()
+    together = joint_whiteness(joint(e, np.concatenate([t, t]), 125.0), 125.0)
+    assert np.array_equal(apart.correlation, together.correlation) and apart.effective_rows == together.effective_rows
+    assert np.array_equal(apart.density, together.density)
 
 
 def test_gaps_and_records_are_no_neighbours():
