@@ -43,9 +43,9 @@ ONLY_IN = {  # library: files and folders that may import it
     "rosbags": ("runtime/records/formats/bags.py",),
     "clarabel": ("runtime/estimators/semidefinite.py",),
     "array_api_compat": ("generated/",),
-    "dask": ("runtime/distributed.py",),
-    "distributed": ("runtime/distributed.py",),
-    "threadpoolctl": ("runtime/distributed.py",),
+    "dask": ("runtime/parallel.py",),
+    "distributed": ("runtime/parallel.py",),
+    "threadpoolctl": ("runtime/parallel.py",),
     "scipy": ("runtime/",),
 }
 LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be mended, then empty

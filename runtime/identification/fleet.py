@@ -17,7 +17,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TypeAlias
 
-from runtime import distributed, parallel
+from runtime import parallel
 from runtime.errors import InputError
 from runtime.identification.identification import identify
 from runtime.identification.result import Identification
@@ -233,7 +233,7 @@ def identify_fleet(
     workers : int
         Processes; 0: this one. The results do not depend on it.
     scheduler : str, optional
-        Address of a Dask cluster that works instead (`runtime.distributed`).
+        Address of a Dask cluster that works instead (`runtime.parallel`).
     finished : function of Finished, int, int
         Called after each job with what it gave, the number of jobs done and their total.
 
@@ -315,10 +315,7 @@ def _all_finished(jobs: Sequence[Job], pack: Packer, workers: int, scheduler: st
                 yield parcel
             else:
                 parcels.append(parcel)
-        if scheduler:
-            yield from distributed.results(identified, None, parcels, scheduler)
-        else:
-            yield from parallel.results(identified, None, parcels, workers)
+        yield from parallel.results(identified, None, parcels, workers, scheduler=scheduler)
 
 
 def identified(context: None, parcel: Parcel) -> Finished:
