@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from runtime.markup import number
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Image, Number, Section, State
 from runtime.resolution.result import Cestac
-from runtime.table import Table
 
 
 def resolution_section(
@@ -27,37 +25,13 @@ def resolution_section(
         if several
         else None
     )
-    header = ("parameter", "LS", *(r.level.label for r in result.levels))
-    values = [(name, number(result.reference.X[i]), *(number(r.mean[i]) for r in result.levels)) for i, name in enumerate(result.names)]
-    errors = [
-        (
-            name + ("" if name in result.deciding else " (does not decide)"),
-            number(result.reference.relative_sigma[i], ".2f"),
-            *(f"{number(r.e[i], '.2f')} ({number(r.relative_sigma[i], '.2f')})" for r in result.levels),
-        )
-        for i, name in enumerate(result.names)
-    ]
-    residual = [
-        ("%e(rho) (22), measured W, as printed", *(number(r.e_rho, ".2f") for r in result.levels)),
-        ("%e(rho) (22), each run's own W", *(number(r.e_rho_own, ".2f") for r in result.levels)),
-        ("increase of the norm in % of |Y|, measured W", *(number(r.increase, ".2f") for r in result.levels)),
-        ("increase of the norm in % of |Y|, own W", *(number(r.increase_own, ".2f") for r in result.levels)),
-        ("verdict of parameters and residual", *(r.verdict for r in result.levels)),
-        ("verdict of the increase (measured W) alone", *(r.residual_verdict for r in result.levels)),
-        ("runs for intervals within 1 %", *(str(r.runs_needed) for r in result.levels)),
-    ]
-    tables = [
-        Table("Mean of the runs (18)", header, values),
-        Table("%e (21) and, in brackets, %sigma (20)", ("parameter", "%sigma of LS", *header[2:]), errors),
-        Table("Residual and verdict", ("reading", *header[2:]), residual),
-    ]
     text = (
         "Two verdicts stand below. The printed rule asks every parameter that decides, and %e(rho), to stay below 1 % (practically unbiased) and calls "
         "5 % biased. The chapter's section 4.1.4 calls the residual the best single indicator, as it sees the whole model: the last verdict applies "
         "the same limits to the increase of its norm alone.",
         *(f"{r.level.label}: {r.message}" for r in result.levels),
     )
-    return Section(title, text, [image] if image else [], tables)
+    return Section(title, text, [image] if image else [], [result.mean_table(), result.error_table(), result.residual_table()])
 
 
 def level_numbers(result: Cestac) -> list[Number]:
@@ -68,8 +42,7 @@ def level_numbers(result: Cestac) -> list[Number]:
 
 def resolution_text(result: Cestac) -> str:
     """Means and residuals as Table 3, then %e (%sigma), then the verdict in one sentence."""
-    errors = f"%e (21) and, in brackets, %sigma (20); * does not decide\n{result.errors_table()}"
-    return f"{result.to_table()}\n\n{errors}\n\n{resolution_verdict(result)}"
+    return f"{result.to_table()}\n\n{resolution_verdict(result)}"
 
 
 def resolution_verdict(result: Cestac) -> str:

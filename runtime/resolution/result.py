@@ -31,9 +31,9 @@ from scipy.special import stdtrit
 from runtime.estimators.estimate import Estimate
 from runtime.json_documents import Vector, json_text
 from runtime.latex import error_table, level_table
-from runtime.markup import Markup, number
+from runtime.markup import number
 from runtime.observation.observation import Observation
-from runtime.table import Table, aligned, notebook
+from runtime.table import Table, notebook
 
 Array = np.ndarray
 
@@ -229,9 +229,18 @@ class LevelResult:
 
 @dataclass(frozen=True, eq=False)
 class Cestac:
-    """A resolution study: the reference X_LS, and one result per level.
+    """A resolution study.
 
-    settings : signals, rows, estimator, study and sampling rate, complete; the bandwidth of the noise is among them.
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters, b of them.
+    reference : Estimate
+        X_LS, of the record as measured.
+    levels : tuple of LevelResult
+    settings : mapping
+        Signals, rows, estimator, study and sampling rate, complete: the bandwidth of the noise decides the result.
+    provenance : mapping
     """
 
     names: tuple[str, ...]
@@ -259,39 +268,46 @@ class Cestac:
         return sum(len(level.runs) for level in self.levels) <= LISTED
 
     def to_table(self) -> str:
-        """As the chapter's Table 3: parameters by levels, then the residual and the verdict."""
-        results = self.levels
-        lines: list[Sequence[str]] = [("parameter", "LS", *(r.level.label for r in results))]
-        for i, name in enumerate(self.names):
-            lines.append((name, f"{self.reference.X[i]:.4g}", *(f"{r.mean[i]:.4g}" for r in results)))
-        lines.append(("largest error %", "", *(f"{max(r.decided_by.values(), default=np.nan):.2f}" for r in results)))
-        lines.append(("%e(rho), printed", "", *(f"{r.e_rho:.2f}" for r in results)))
-        lines.append(("%e(rho), own W", "", *(f"{r.e_rho_own:.2f}" for r in results)))
-        lines.append(("increase / |Y| %", "", *(f"{r.increase:.2f}" for r in results)))
-        lines.append(("increase, own W %", "", *(f"{r.increase_own:.2f}" for r in results)))
-        lines.append(("verdict", "", *(r.verdict for r in results)))
-        lines.append(("verdict of increase", "", *(r.residual_verdict for r in results)))
-        notes = "\n".join(f"{r.level.label}: {r.message}" for r in results)
-        return f"{aligned(lines)}\n\n{notes}"
+        """Means as the chapter's Table 3, residual and verdict, then %e with %sigma, then every verdict in words."""
+        means, residual, errors = self.mean_table(), self.residual_table(), self.error_table()
+        notes = "\n".join(f"{r.level.label}: {r.message}" for r in self.levels)
+        return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{errors.caption}\n{errors.to_text()}"
 
-    def errors_table(self) -> str:
+    def mean_table(self) -> Table:
+        """Mean of the runs of every parameter and level."""
+        rows = [(name, number(self.reference.X[i]), *(number(r.mean[i]) for r in self.levels)) for i, name in enumerate(self.names)]
+        return Table("Mean of the runs (18)", ("parameter", "LS", *(r.level.label for r in self.levels)), rows)
+
+    def error_table(self) -> Table:
         """%e (21) and, in brackets, %sigma (20) of every parameter and level; `*` marks parameters that do not decide."""
-        lines: list[Sequence[str]] = [("parameter", *(r.level.label for r in self.levels))]
-        for i, name in enumerate(self.names):
-            mark = "" if name in self.deciding else " *"
-            lines.append((name + mark, *(f"{r.e[i]:.2f} ({r.relative_sigma[i]:.2f})" for r in self.levels)))
-        return aligned(lines)
-
-    def _repr_html_(self) -> str:
-        labels = [r.level.label for r in self.levels]
         rows = [
-            (name, number(self.reference.X[i]), *(f"{number(r.mean[i])} ({number(r.e[i], '.2f')} %)" for r in self.levels))
+            (
+                name if name in self.deciding else f"{name} *",
+                number(self.reference.relative_sigma[i], ".2f"),
+                *(f"{number(r.e[i], '.2f')} ({number(r.relative_sigma[i], '.2f')})" for r in self.levels),
+            )
             for i, name in enumerate(self.names)
         ]
-        rows.append((Markup("%e(ρ)"), "", *(f"{number(r.e_rho, '.2f')} %" for r in self.levels)))
-        rows.append((Markup("verdict"), "", *(r.verdict for r in self.levels)))
-        table = Table("Resolution study", ("parameter", "least squares", *labels), rows, symbols=True)
-        return notebook([f"Resolution study: mean of the runs and, in brackets, %e (21); {self.verdict}"], table)
+        caption = "%e (21) and, in brackets, %sigma (20); * does not decide"
+        return Table(caption, ("parameter", "%sigma of LS", *(r.level.label for r in self.levels)), rows)
+
+    def residual_table(self) -> Table:
+        """Both readings of %e(rho), the increase of the norm, and the verdict, by level."""
+        levels = self.levels
+        rows = [
+            ("largest error of what decides, %", *(number(max(r.decided_by.values(), default=np.nan), ".2f") for r in levels)),
+            ("%e(rho) (22), measured W, as printed", *(number(r.e_rho, ".2f") for r in levels)),
+            ("%e(rho) (22), each run's own W", *(number(r.e_rho_own, ".2f") for r in levels)),
+            ("increase of the norm in % of |Y|, measured W", *(number(r.increase, ".2f") for r in levels)),
+            ("increase of the norm in % of |Y|, own W", *(number(r.increase_own, ".2f") for r in levels)),
+            ("verdict of parameters and residual", *(r.verdict for r in levels)),
+            ("verdict of the increase (measured W) alone", *(r.residual_verdict for r in levels)),
+            ("runs for intervals within 1 %", *(str(r.runs_needed) for r in levels)),
+        ]
+        return Table("Residual and verdict", ("reading", *(r.level.label for r in levels)), rows)
+
+    def _repr_html_(self) -> str:
+        return notebook([f"Resolution study: {self.verdict}"], self.residual_table(), self.mean_table(), self.error_table())
 
     def _repr_latex_(self) -> str:
         return self.to_latex()

@@ -274,8 +274,8 @@ def test_text_and_json(small):
     assert data["provenance"]["seed"] == 1 and data["provenance"]["files"] == {"planar.csv": "cd" * 32}
     assert len(data["levels"]) == 2 and data["levels"][0]["level"] == {"delta": 0.001, "torque": 0.0}
     text = str(small)
-    assert "%e(rho), printed" in text and "verdict" in text
-    assert len(small.errors_table().splitlines()) == 11
+    assert "%e(rho) (22), measured W, as printed" in text and "verdict" in text
+    assert len(small.error_table().to_text().splitlines()) == 11
     assert Level(2 * np.pi / 5000).label == "2*pi/5000" and Level(0.0).label == "none"
     assert Level(1e-6).label == "1e-06"  # a linear encoder, m: no counts per turn
 
