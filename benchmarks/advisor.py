@@ -18,16 +18,17 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from symgen.cli.session import opened_model, single_thread
+from symgen.cli.session import single_thread
 
 single_thread()
 
 import numpy as np  # noqa: E402  (numpy reads the number of threads when it loads)
 from scipy.special import stdtrit  # noqa: E402
 
-from runtime.estimators import linear_system  # noqa: E402
-from runtime.estimators.essential import essential  # noqa: E402
+import symgen  # noqa: E402
+from runtime.estimators.essential import essential_of  # noqa: E402
 from runtime.estimators.linear import assemble  # noqa: E402
+from runtime.estimators.methods import linear_system  # noqa: E402
 from runtime.observation.observation import observe  # noqa: E402
 from runtime.observation.position_errors import perturbation  # noqa: E402
 from runtime.records.datasets import dataset_study  # noqa: E402
@@ -37,7 +38,7 @@ from runtime.resolution.advisor import LIMITS, advise, sampled_level  # noqa: E4
 from runtime.resolution.cestac import cestac  # noqa: E402
 from runtime.resolution.perturbed import Task, prepared  # noqa: E402
 from runtime.settings.study import study_from_mapping  # noqa: E402
-from symgen.demo.haptic_record import haptic_record, haptic_study  # noqa: E402
+from symgen.demo.haptic_motion import haptic_record, haptic_study  # noqa: E402
 
 RUNS = {"emps": 100, "tx40": 60, "haptic": 30}
 LEVELS = 8
@@ -132,9 +133,10 @@ def needed_runs(whole, model, record, names, level):
 def main():
     """Print the tables of the robots named."""
     for name in sys.argv[1:] or RUNS:
-        with opened_model(name) as model, TemporaryDirectory() as folder:
+        with TemporaryDirectory() as folder:
+            model = symgen.model(name)
             study, record = opened(name, model, Path(folder))
-            found = essential(observe(model, record, study), study.essential, study.estimate)
+            found = essential_of(observe(model, record, study), study.essential, study.estimate)
             advice, level = steps_table(name, model, study, record, found.names)
             cost(name, model, study, record, found.names, advice, level)
 

@@ -35,7 +35,7 @@ import scipy
 from rounds import interleave, processor, ratio
 
 from runtime import Record, Study, load_model
-from runtime.estimators.essential import essential
+from runtime.estimators.essential import essential_of
 from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.model.compiled import compiled_model
 from runtime.model.drives import Drives
@@ -161,7 +161,7 @@ def main() -> None:
         study = study_from_mapping(dataset_study(ROBOT))
         study = replace(study, cestac=replace(study.cestac, delta=(2 * np.pi / 5000,), rounding="two-point", side="joint"))
         record = read_records(study.record, model)[0]
-        names = essential(observe(model, record, study), study.essential, study.estimate).names
+        names = essential_of(observe(model, record, study), study.essential, study.estimate).names
         every, whole = tuple(model.BASE_PARAMETERS), replace(study, rows=replace(study.rows, window=(None, None)))
         measure("TX40 in motion, essential columns", model, record, study, names, settings.rounds)
         measure("TX40 in motion, all columns", model, record, study, every, settings.rounds)

@@ -32,7 +32,7 @@ import numpy as np
 from c_speed import processor
 
 from runtime import Record, Study, load_model, observe
-from runtime.estimators.essential import essential
+from runtime.estimators.essential import essential_of
 from runtime.model.compiled import compiled_model
 from runtime.model.generated import GeneratedModel
 from runtime.records.datasets import dataset_study
@@ -52,7 +52,7 @@ def prepared(folder: Path, runs: int, target: str) -> tuple[GeneratedModel, Reco
     model = load_model(ROBOT, folder=folder)
     study = study_from_mapping(dataset_study(ROBOT))
     record = read_records(study.record, model)[0]
-    names = essential(observe(model, record, study), study.essential, study.estimate).names
+    names = essential_of(observe(model, record, study), study.essential, study.estimate).names
     study = replace(study, cestac=replace(study.cestac, delta=(DELTA,), runs=runs))
     return (compiled_model(model) if target == "c" else model), record, study, names
 

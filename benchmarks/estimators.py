@@ -31,7 +31,7 @@ from matplotlib.ticker import NullFormatter
 from simulation import LAW
 
 from runtime import InputError, load_model
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.estimators.closed_loop import ClosedLoop, closed_loop
 from runtime.estimators.estimate import Estimate
 from runtime.model.generated import GeneratedModel
@@ -141,7 +141,7 @@ def estimates(_: None, key: Key) -> list[dict[str, Any]]:
         begun = time.process_time()
         row = {"robot": key.robot, "step": key.step, "seed": key.seed, "recorded": key.recorded, "method": method}
         try:
-            e = estimate(_rows(b, record, seen, method, key), settings_of(b, method, key), model=b.model)
+            e = estimate_of(_rows(b, record, seen, method, key), settings_of(b, method, key), model=b.model)
             row |= {"X": e.X.tolist(), "sigma": e.sigma.tolist(), "corrected": e.sigma_corrected.tolist(), "status": e.status}
         except InputError as error:
             row |= {"status": str(error)}
@@ -181,7 +181,7 @@ def computed(file: Path, keys: Sequence[Key], workers: int) -> list[dict[str, An
 def determined(robot: str) -> list[int]:
     """Parameters that are not zero and that a record with an exact encoder determines to DETERMINED %."""
     b = bench(robot)
-    found: Estimate = estimate(made(Key(robot, 0.0, 0, ()))[1].measured(), EstimateSettings("wls"), model=b.model)
+    found: Estimate = estimate_of(made(Key(robot, 0.0, 0, ()))[1].measured(), EstimateSettings("wls"), model=b.model)
     return [i for i, x in enumerate(b.truth) if x and 100 * found.sigma_corrected[i] < DETERMINED * abs(x)]
 
 

@@ -25,7 +25,7 @@ from simulation import LAW
 
 from runtime import load_model
 from runtime.errors import InputError
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.estimators.closed_loop import closed_loop
 from runtime.estimators.estimate import Estimate
 from runtime.model.generated import GeneratedModel
@@ -75,7 +75,7 @@ def emps() -> str:
             seen = closed_loop(model, [record], study, simulators[delay]).measured()
             if settings.method == "tls":
                 seen = with_errors(model, record, study, seen, ENCODER["emps"])
-            found = estimate(seen, settings, model=model)
+            found = estimate_of(seen, settings, model=model)
             errors = []
             for simulator in simulators:
                 run = simulator.run(found.X, references[k], start=record.q[0], ideal=True, disturbance=pulses if k else None)
@@ -129,7 +129,7 @@ def agreement() -> str:
     lines: list[Sequence[str]] = [("rows", "per joint", "largest |IV - WLS|/sigma", "of", "WLS", "IV")]
     for label, low_speed, around in (("all", 0.0, 0.0), ("without slower than 0.1 rad/s and 0.05 s around", 0.1, 0.05)):
         model, _, seen = tx40_rows(low_speed, around)
-        least, iv = (estimate(seen, EstimateSettings(m, options=IV if m == "iv" else {}), model=model) for m in ("wls", "iv"))
+        least, iv = (estimate_of(seen, EstimateSettings(m, options=IV if m == "iv" else {}), model=model) for m in ("wls", "iv"))
         z = np.abs(iv.X - least.X) / iv.sigma_corrected
         k = int(np.argmax(z))
         lines.append((label, f"{min(seen.rows)} to {max(seen.rows)}", f"{z[k]:.1f}", seen.names[k], f"{least.X[k]:.4g}", f"{iv.X[k]:.4g}"))
@@ -150,8 +150,8 @@ def tx40(methods: Sequence[str]) -> tuple[str, str]:
     for method in methods:
         settings = EstimateSettings(method, options=options.get(method, {}))  # type: ignore[arg-type]
         try:
-            found[method] = e = estimate(seen, settings, model=model)
-            held = predicted(second, estimate(first, settings, model=model).X)
+            found[method] = e = estimate_of(seen, settings, model=model)
+            held = predicted(second, estimate_of(first, settings, model=model).X)
         except InputError as error:
             lines.append((method, str(error)))
             continue

@@ -21,18 +21,17 @@ from ruamel.yaml import YAML
 from simulation import LAW
 
 from runtime import load_model
-from runtime.estimators import estimate
-from runtime.estimators.essential import essential
-from runtime.excitation.criteria import excesses, kept_correlation, limits_of, observed, usage, weights_of
+from runtime.estimators.methods import estimate_of
+from runtime.excitation.criteria import excesses, kept_correlation, planned, weights_of
 from runtime.excitation.search import excite
 from runtime.motion.reference import Reference
 from runtime.motion.simulation import Simulator, parameters_of
 from runtime.observation.filters import decimated, decimation_factor
 from runtime.observation.observation import observe
+from runtime.records.named import study_of
 from runtime.records.reading import read_records
 from runtime.settings.controller import Controller
 from runtime.settings.excitation import ExcitationSettings
-from runtime.records.named import study_of
 from runtime.settings.schema import structure
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
@@ -51,40 +50,29 @@ def main() -> None:
     model = load_model("tx40", folder=GENERATED)
     study, folder = study_of("tx40")
     (record,) = read_records(study.record, model, folder=folder)
-    seen = observe(model, record, study)
-    fit, chosen = estimate(seen, model=model), essential(seen, study.essential)
-    s = [joint.sigma_rho for joint in fit.per_joint]
     settings = ExcitationSettings(columns=given.columns, starts=given.starts, criterion=given.criterion, rate=RATE)
-    weights = weights_of(model, settings, dict(zip(fit.names, fit.X, strict=True)), essential=chosen.names, s=s)
-    limits = limits_of(model, {})
     begin = time.perf_counter()
     found = excite(
         model,
-        str(GENERATED / "tx40_casadi.py"),
-        study,
-        settings,
-        weights,
-        limits,
-        fit.X,
+        record,
+        replace(study, excitation=settings),
         workers=given.workers,
         progress=lambda done, total: print(f"  {done} of {total} starts", flush=True),
     )
-    wall = time.perf_counter() - begin
-    before, correlation = weights.condition(seen), kept_correlation(study.signals, RATE)
+    wall, known = time.perf_counter() - begin, found.known
+    ratio = found.condition / known.condition
     print(
-        f"{len(weights.names)} columns, weighted cond(W): record {before:.1f}, found {found.condition:.1f}, ratio {found.condition / before:.2f}"
+        f"{len(known.weights.names)} columns, weighted cond(W): record {known.condition:.1f}, found {found.condition:.1f}, ratio {ratio:.2f}"
     )
-    print(
-        f"largest predicted %sigma: record {weights.relative_sigma(seen, correlation).max():.1f}, found {max(found.relative_sigma.values()):.1f}"
-    )
+    print(f"largest predicted %sigma: record {max(known.relative_sigma.values()):.1f}, found {max(found.relative_sigma.values()):.1f}")
     print(f"motion of {found.motion.duration:.1f} s in {wall:.0f} s of {max(given.workers, 1)} processes, margin {found.margin:.2f}")
-    print(f"limits passed at {RATE:g} Hz: {len(excesses(model, found.motion, limits, settings, fit.X))}")
-    for what, shares in usage(model, found.motion, limits, RATE, fit.X).items():
+    print(f"limits exceeded at {RATE:g} Hz: {len(excesses(model, found.motion, found.limits, settings, known.X))}")
+    for what, shares in found.usage.items():
         print(f"  {what:<14}" + "".join(f"{100 * x:7.1f}" for x in shares) + " % of the limit, by joint")
     if given.output is not None:
         with given.output.open("w", encoding="utf-8") as stream:
             YAML(typ="safe").dump({"motion": found.motion.to_mapping()}, stream)
-    confirm(model, study, found.motion, np.array(s), given.records)
+    confirm(model, study, found.motion, known.weights.s, given.records)
 
 
 def confirm(model: object, study: object, motion: object, s: np.ndarray, records: int) -> None:
@@ -105,15 +93,15 @@ def confirm(model: object, study: object, motion: object, s: np.ndarray, records
     left = float(np.std(decimated(rng.standard_normal((1, 1_000_000)), factor, asked.signals.decimate)))
     clean = run.record()
     predicted = everything.relative_sigma(observe(model, clean, asked), kept_correlation(asked.signals, RATE))
-    planned = everything.relative_sigma(observed(model, motion, asked, RATE), kept_correlation(asked.signals, RATE))
+    promised = everything.relative_sigma(planned(model, motion, asked, RATE), kept_correlation(asked.signals, RATE))
     estimates = []
     for _ in range(records):
         tau = clean.tau + (s / left) * rng.standard_normal(clean.tau.shape)
         noisy = replace(clean, tau=tau)
-        estimates.append(estimate(observe(model, noisy, asked), asked.estimate, model=model).X)
+        estimates.append(estimate_of(observe(model, noisy, asked), asked.estimate, model=model).X)
     scatter = 100 * np.std(estimates, axis=0, ddof=1) / everything.size
-    used = planned < 30
-    for label, sigma in (("planned motion", planned), ("simulated motion", predicted)):
+    used = promised < 30
+    for label, sigma in (("planned motion", promised), ("simulated motion", predicted)):
         ratio = (scatter / sigma)[used]
         print(
             f"{records} simulated records, {np.count_nonzero(used)} parameters, scatter / predicted %sigma of the {label}: "

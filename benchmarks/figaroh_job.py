@@ -36,7 +36,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.estimators.estimate import Estimate
 from runtime.files import read_bytes
 from runtime.model.compiled import compiled_model
@@ -77,7 +77,7 @@ def job(model: GeneratedModel, study: Study) -> tuple[Done, Observation, Estimat
     record = read_records(study.record, model)[0]
     read = time.process_time()
     observation = observe(model, record, study)
-    found = estimate(observation, study.estimate, model=model)
+    found = estimate_of(observation, study.estimate, model=model)
     return Done(time.process_time() - start, read - start), observation, found
 
 

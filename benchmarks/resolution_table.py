@@ -8,26 +8,19 @@ One BLAS thread. The table is the one in the report of `symgen demo`; the times 
 import time
 from itertools import pairwise
 
-from symgen.cli.session import opened_model, single_thread
+from symgen.cli.session import single_thread
 
 single_thread()
 
-from runtime.records.datasets import dataset_study  # noqa: E402  (numpy reads the number of threads when it loads)
-from runtime.records.reading import read_records  # noqa: E402
-from runtime.settings.study import study_from_mapping  # noqa: E402
-from symgen.demo.chapter_tables import TABLE_3  # noqa: E402
-from symgen.demo.demonstration import demonstrate  # noqa: E402
-from symgen.demo.sections import KEY, TOLERANCE  # noqa: E402
+from symgen.demo.tx40 import KEY, TOLERANCE, demonstrate, prepare  # noqa: E402  (numpy reads the number of threads when it loads)
+from symgen.demo.tx40_tables import TABLE_3  # noqa: E402
 
 
 def main() -> None:
     """Print the table and the times."""
     marks = [("start, robot file, record", 0.0)]
 
-    with opened_model("tx40") as model:
-        study = study_from_mapping(dataset_study("tx40"))
-        record = read_records(study.record, model)[0]
-        shown = demonstrate(model, study, record, quick=False, step=lambda text: marks.append((text, time.process_time())))
+    shown = demonstrate(prepare(quick=False), quick=False, progress=lambda text: marks.append((text, time.process_time())))
     marks.append(("end", time.process_time()))
 
     print(f"{'mean ' + KEY:70s}" + "".join(f"{level.level.label:>12s}" for level in shown.resolution.levels))

@@ -208,11 +208,10 @@ def forward_dynamics(q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarr
 
 def jacobian(q: np.ndarray, *, frame: int | None = None, g: float = 9.81) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 1)."""
-    T = frame_poses(q).reshape(-1, 1, 4, 4)
-    J = np.zeros((len(T), 6, 1))
-    last = 1 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 1 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q).reshape(-1, 1, 4, 4)
+    J, P = np.zeros((len(T), 6, 1)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -263,9 +262,7 @@ def _bias_block(qd, GAM, X):
     """Fill GAM, shape (1, N), where it is not constant, from qd (1, N)."""
     # Inputs
     QP1 = qd[0]
-    FV1 = X[1]
-    FS1 = X[2]
-    OFFSET1 = X[3]
+    FV1, FS1, OFFSET1 = X[1:]
     # Torques
     GAM[0] = OFFSET1 + FV1*QP1 + FS1*np.sign(QP1)
 

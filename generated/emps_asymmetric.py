@@ -188,7 +188,6 @@ def gravity(q: np.ndarray, X: np.ndarray, *, g: float = 9.81) -> np.ndarray:
     """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 1)."""
     states = _states(q)
     GAM = np.zeros((1, len(states[0])))
-    _fill(_gravity_block, GAM, ())
     return _by_sample(GAM, q)
 
 
@@ -209,11 +208,10 @@ def forward_dynamics(q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarr
 
 def jacobian(q: np.ndarray, *, frame: int | None = None, g: float = 9.81) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 1)."""
-    T = frame_poses(q).reshape(-1, 1, 4, 4)
-    J = np.zeros((len(T), 6, 1))
-    last = 1 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 1 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q).reshape(-1, 1, 4, 4)
+    J, P = np.zeros((len(T), 6, 1)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -270,18 +268,11 @@ def _bias_block(qd, GAM, X):
     """Fill GAM, shape (1, N), where it is not constant, from qd (1, N)."""
     # Inputs
     QP1 = qd[0]
-    FVP1 = X[1]
-    FSP1 = X[2]
-    FVN1 = X[3]
-    FSN1 = X[4]
+    FVP1, FSP1, FVN1, FSN1 = X[1:]
     # Friction, actuators
     signQP1 = np.sign(QP1)
     # Torques
     GAM[0] = FVP1*np.maximum(QP1, 0.0) + FSP1*np.maximum(signQP1, 0.0) - FVN1*(-np.minimum(QP1, 0.0)) - FSN1*(-np.minimum(signQP1, 0.0))
-
-
-def _gravity_block(GAM):
-    """Fill GAM, shape (1, N), where it is not constant."""
 
 
 def _frame_poses_block(q, T):

@@ -153,9 +153,7 @@ def _bias(qd, X):
     GAM = ca.SX(1, 1)
     # Inputs
     QP1 = qd[0]
-    FV1 = X[1]
-    FS1 = X[2]
-    OFFSET1 = X[3]
+    FV1, FS1, OFFSET1 = X[1:]
     # Torques
     GAM[0, 0] = OFFSET1 + FV1*QP1 + FS1*ca.sign(QP1)
     return GAM
@@ -185,7 +183,7 @@ def _frame_poses(q):
     return T
 
 
-def _forward_dynamics(q, qd, tau, X):
+def _forward_dynamics(qd, tau, X):
     """qdd = A(q)**-1 (tau - bias)."""
     return _solved(_inertia_matrix(X), ca.vertcat(*tau) - _bias(qd, X))
 
@@ -209,10 +207,10 @@ def _solved(A, b):
 
 def _jacobian(frame, q):
     """Velocity of the origin of `frame`, then its angular velocity, in frame 0, per joint rate."""
-    T = _frame_poses(q)
+    path, T = _paths()[frame], _frame_poses(q)
     J = ca.SX(6, 1)
     P = T[frame - 1][:3, 3]
-    for j, sigma, rates in _paths()[frame]:
+    for j, sigma, rates in path:
         z = T[j - 1][:3, 2]
         v, w = (z, ca.SX(3, 1)) if sigma else (ca.cross(z, P - T[j - 1][:3, 3]), z)
         for k, rate in rates:
@@ -239,7 +237,7 @@ inverse_dynamics = _modelled("inverse_dynamics", ['q', 'qd', 'qdd', 'X'], _inver
 inertia_matrix = _modelled("inertia_matrix", ['q', 'X'], _inertia_matrix, ['X'], *['A'])
 bias = _modelled("bias", ['q', 'qd', 'X'], _bias, ['qd', 'X'], *['GAM'])
 gravity = _modelled("gravity", ['q', 'X'], _gravity, ['X'], *['GAM'])
-forward_dynamics = _modelled("forward_dynamics", ['q', 'qd', 'tau', 'X'], _forward_dynamics, ['q', 'qd', 'tau', 'X'], *['qdd'])
+forward_dynamics = _modelled("forward_dynamics", ['q', 'qd', 'tau', 'X'], _forward_dynamics, ['qd', 'tau', 'X'], *['qdd'])
 frame_poses = _modelled("frame_poses", ['q'], _frame_poses, ['q'], *['T1'])
 jacobian = jacobian_of(1)
 inverse_dynamics_derivatives = _derivatives("inverse_dynamics_derivatives", ["q", "qd", "qdd", "X"], inverse_dynamics, "GAM")

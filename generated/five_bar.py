@@ -292,17 +292,16 @@ def jacobian(
     L4: float = 0.34, g: float = 9.81
 ) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 2)."""
-    T = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4).reshape(-1, 6, 4, 4)
-    J = np.zeros((len(T), 6, 4))
-    last = 6 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 6 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4).reshape(-1, 6, 4, 4)
+    G = _closed(_states(q), L0, L1, L2, L3, L4)[3].reshape(-1, 2, 2)
+    J, P = np.zeros((len(T), 6, 4)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    G = _closed(_states(q), L0, L1, L2, L3, L4)[3].reshape(-1, 2, 2)
     J = J[..., :2] + J[..., 2:] @ G
     return J[0] if np.ndim(q) == 1 else J
 
@@ -553,8 +552,7 @@ def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L1, L3, g):
 def _inertia_matrix_block(q, G, A, X, L1, L3):
     """Fill A, shape (2, 2, N), where it is not constant, from q (4, N); G (4, N)."""
     # Inputs
-    q2 = q[2]
-    q4 = q[3]
+    q2, q4 = q[2:]
     G21, G23, G41, G43 = G
     ZZ1R = X[0]
     ZZ2R = X[6]
@@ -605,8 +603,7 @@ def _bias_block(q, qd, qdd, G, GAM, X, L1, L3, g):
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
-    QDP2 = qdd[2]
-    QDP4 = qdd[3]
+    QDP2, QDP4 = qdd[2:]
     G21, G23, G41, G43 = G
     MX1R = X[1]
     MY1 = X[2]

@@ -275,17 +275,16 @@ def jacobian(
     g: float = 9.81
 ) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 1)."""
-    T = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3).reshape(-1, 5, 4, 4)
-    J = np.zeros((len(T), 6, 3))
-    last = 5 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 5 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3).reshape(-1, 5, 4, 4)
+    G = _closed(_states(q), L0, L1, L2, L3)[3].reshape(-1, 2, 1)
+    J, P = np.zeros((len(T), 6, 3)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    G = _closed(_states(q), L0, L1, L2, L3)[3].reshape(-1, 2, 1)
     J = J[..., :1] + J[..., 1:] @ G
     return J[0] if np.ndim(q) == 1 else J
 
@@ -407,8 +406,7 @@ def _regressor_block(q, qd, qdd, G, D, L1, g):
     """Fill D, shape (11, 1, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
     # Inputs
     q1, q2, q3 = q
-    QP1 = qd[0]
-    QP2 = qd[1]
+    QP1, QP2 = qd[:2]
     QDP1, QDP2, QDP3 = qdd
     G21, G31 = G
     # Trigonometry
@@ -451,8 +449,7 @@ def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L1, g):
     """Fill GAM, shape (1, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
     # Inputs
     q1, q2, q3 = q
-    QP1 = qd[0]
-    QP2 = qd[1]
+    QP1, QP2 = qd[:2]
     QDP1, QDP2, QDP3 = qdd
     G21, G31 = G
     ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3 = X
@@ -524,21 +521,10 @@ def _bias_block(q, qd, qdd, G, GAM, X, L1, g):
     """Fill GAM, shape (1, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
     # Inputs
     q1, q2, q3 = q
-    QP1 = qd[0]
-    QP2 = qd[1]
-    QDP2 = qdd[1]
-    QDP3 = qdd[2]
+    QP1, QP2 = qd[:2]
+    QDP2, QDP3 = qdd[1:]
     G21, G31 = G
-    MX1R = X[1]
-    MY1 = X[2]
-    FV1 = X[3]
-    FS1 = X[4]
-    OFFSET1 = X[5]
-    ZZ2R = X[6]
-    MX2R = X[7]
-    MY2 = X[8]
-    ZZ3R = X[9]
-    MY3 = X[10]
+    MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3 = X[1:]
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)

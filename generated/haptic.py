@@ -360,11 +360,10 @@ def jacobian(
     gx: float = -9.81, gy: float = 0.0
 ) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 3)."""
-    T = frame_poses(q, D3=D3, D4=D4, D6=D6, c=c).reshape(-1, 8, 4, 4)
-    J = np.zeros((len(T), 6, 3))
-    last = 8 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 8 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, D3=D3, D4=D4, D6=D6, c=c).reshape(-1, 8, 4, 4)
+    J, P = np.zeros((len(T), 6, 3)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -722,8 +721,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
 def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     """Fill A, shape (3, 3, N), where it is not constant, from q (3, N)."""
     # Inputs
-    q2 = q[1]
-    q5 = q[2]
+    q2, q5 = q[1:]
     ZZ1R = X[0]
     XX2R = X[6]
     XY2R = X[7]
@@ -818,35 +816,10 @@ def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
     # Inputs
     q1, q2, q5 = q
     QP1, QP2, QP5 = qd
-    MX1 = X[1]
-    MY1R = X[2]
-    FV1 = X[3]
-    FS1 = X[4]
-    OFFSET1 = X[5]
-    XX2R = X[6]
-    XY2R = X[7]
-    XZ2R = X[8]
-    YZ2R = X[9]
-    ZZ2R = X[10]
-    MX2R = X[11]
-    MY2 = X[12]
-    FV2R = X[13]
-    FS2R = X[14]
-    OFFSET2 = X[15]
-    XX3R = X[16]
-    XY3R = X[17]
-    XZ3R = X[18]
-    YZ3R = X[19]
-    ZZ3R = X[20]
-    MX3R = X[21]
-    MY3 = X[22]
-    MX4R = X[23]
-    MX5R = X[24]
-    MY5 = X[25]
-    FV5R = X[26]
-    FS5R = X[27]
-    OFFSET5 = X[28]
-    MY6 = X[29]
+    (
+        MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R, OFFSET2, XX3R, XY3R, XZ3R,
+        YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5, MY6
+    ) = X[1:]
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)

@@ -372,11 +372,10 @@ def jacobian(
     RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
 ) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 7)."""
-    T = frame_poses(q, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7).reshape(-1, 7, 4, 4)
-    J = np.zeros((len(T), 6, 7))
-    last = 7 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 7 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7).reshape(-1, 7, 4, 4)
+    J, P = np.zeros((len(T), 6, 7)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -400,12 +399,7 @@ def _paths():
 def _regressor_block(q, qd, qdd, D, RL3, D4, RL5, D7, g):
     """Fill D, shape (69, 7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
-    q7 = q[6]
+    q2, q3, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
     QDP1, QDP2, QDP3, QDP4, QDP5, QDP6, QDP7 = qdd
     # Trigonometry
@@ -915,12 +909,7 @@ def _regressor_block(q, qd, qdd, D, RL3, D4, RL5, D7, g):
 def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL3, D4, RL5, D7, g):
     """Fill GAM, shape (7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
-    q7 = q[6]
+    q2, q3, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
     QDP1, QDP2, QDP3, QDP4, QDP5, QDP6, QDP7 = qdd
     (
@@ -1197,12 +1186,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL3, D4, RL5, D7, g):
 def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     """Fill A, shape (7, 7, N), where it is not constant, from q (7, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
-    q7 = q[6]
+    q2, q3, q4, q5, q6, q7 = q[1:]
     ZZ1R = X[0]
     XX2R = X[4]
     XY2 = X[5]
@@ -1647,12 +1631,7 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
 def _bias_block(q, qd, GAM, X, RL3, D4, RL5, D7, g):
     """Fill GAM, shape (7, N), where it is not constant, from q (7, N); qd (7, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
-    q7 = q[6]
+    q2, q3, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
     FV1 = X[1]
     FS1 = X[2]
@@ -1972,12 +1951,7 @@ def _bias_block(q, qd, GAM, X, RL3, D4, RL5, D7, g):
 def _gravity_block(q, GAM, X, g):
     """Fill GAM, shape (7, N), where it is not constant, from q (7, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
-    q7 = q[6]
+    q2, q3, q4, q5, q6, q7 = q[1:]
     OFFSET1 = X[3]
     MX2 = X[9]
     MY2R = X[10]

@@ -244,11 +244,10 @@ def forward_dynamics(
 
 def jacobian(q: np.ndarray, *, frame: int | None = None, D2: float = 0.5, g: float = 9.81) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 2)."""
-    T = frame_poses(q, D2=D2).reshape(-1, 2, 4, 4)
-    J = np.zeros((len(T), 6, 2))
-    last = 2 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 2 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, D2=D2).reshape(-1, 2, 4, 4)
+    J, P = np.zeros((len(T), 6, 2)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:

@@ -315,11 +315,10 @@ def forward_dynamics(
 
 def jacobian(q: np.ndarray, *, frame: int | None = None, D3: float = 0.45, RL4: float = 0.45, g: float = 9.81) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 6)."""
-    T = frame_poses(q, D3=D3, RL4=RL4).reshape(-1, 6, 4, 4)
-    J = np.zeros((len(T), 6, 6))
-    last = 6 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 6 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, D3=D3, RL4=RL4).reshape(-1, 6, 4, 4)
+    J, P = np.zeros((len(T), 6, 6)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -342,11 +341,7 @@ def _paths():
 def _regressor_block(q, qd, qdd, D, D3, RL4, g):
     """Fill D, shape (58, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6 = qd
     QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
     # Trigonometry
@@ -730,11 +725,7 @@ def _regressor_block(q, qd, qdd, D, D3, RL4, g):
 def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, RL4, g):
     """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6 = qd
     QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
     (
@@ -964,11 +955,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, RL4, g):
 def _inertia_matrix_block(q, A, X, D3, RL4):
     """Fill A, shape (6, 6, N), where it is not constant, from q (6, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     ZZ1R = X[0]
     XX2R = X[4]
     XY2 = X[5]
@@ -1242,11 +1229,7 @@ def _inertia_matrix_block(q, A, X, D3, RL4):
 def _bias_block(q, qd, GAM, X, D3, RL4, g):
     """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6 = qd
     FV1 = X[1]
     FS1 = X[2]
@@ -1505,11 +1488,7 @@ def _bias_block(q, qd, GAM, X, D3, RL4, g):
 def _gravity_block(q, GAM, X, g):
     """Fill GAM, shape (6, N), where it is not constant, from q (6, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     OFFSET1 = X[3]
     MX2R = X[9]
     MY2 = X[10]

@@ -273,11 +273,10 @@ def forward_dynamics(
 
 def jacobian(q: np.ndarray, *, frame: int | None = None, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 4)."""
-    T = frame_poses(q, D2=D2, D3=D3).reshape(-1, 4, 4, 4)
-    J = np.zeros((len(T), 6, 4))
-    last = 4 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 4 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, D2=D2, D3=D3).reshape(-1, 4, 4, 4)
+    J, P = np.zeros((len(T), 6, 4)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -298,8 +297,7 @@ def _paths():
 def _regressor_block(q, qd, qdd, D, D2, D3, g):
     """Fill D, shape (22, 4, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
+    q2, q3 = q[1:3]
     QP1, QP2, QP3, QP4 = qd
     QDP1, QDP2, QDP3, QDP4 = qdd
     # Trigonometry
@@ -374,8 +372,7 @@ def _regressor_block(q, qd, qdd, D, D2, D3, g):
 def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, g):
     """Fill GAM, shape (4, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
+    q2, q3 = q[1:3]
     QP1, QP2, QP3, QP4 = qd
     QDP1, QDP2, QDP3, QDP4 = qdd
     (
@@ -440,8 +437,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, g):
 def _inertia_matrix_block(q, A, X, D2, D3):
     """Fill A, shape (4, 4, N), where it is not constant, from q (4, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
+    q2, q3 = q[1:3]
     ZZ1R = X[0]
     ZZ2R = X[4]
     MX2R = X[5]
@@ -507,8 +503,7 @@ def _inertia_matrix_block(q, A, X, D2, D3):
 def _bias_block(q, qd, GAM, X, D2, D3, g):
     """Fill GAM, shape (4, N), where it is not constant, from q (4, N); qd (4, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
+    q2, q3 = q[1:3]
     QP1, QP2, QP3, QP4 = qd
     FV1 = X[1]
     FS1 = X[2]

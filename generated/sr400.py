@@ -367,11 +367,10 @@ def jacobian(
     D8: float = 0.3, g: float = 9.81
 ) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 6)."""
-    T = frame_poses(q, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8).reshape(-1, 10, 4, 4)
-    J = np.zeros((len(T), 6, 6))
-    last = 10 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 10 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8).reshape(-1, 10, 4, 4)
+    J, P = np.zeros((len(T), 6, 6)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -418,11 +417,7 @@ def passive_joints(
 def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     """Fill D, shape (60, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
-    q2 = q[1]
-    q4 = q[2]
-    q5 = q[3]
-    q6 = q[4]
-    q7 = q[5]
+    q2, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP4, QP5, QP6, QP7 = qd
     QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
     # Trigonometry
@@ -801,11 +796,7 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
 def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
-    q2 = q[1]
-    q4 = q[2]
-    q5 = q[3]
-    q6 = q[4]
-    q7 = q[5]
+    q2, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP4, QP5, QP6, QP7 = qd
     QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
     (
@@ -1065,11 +1056,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
 def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     """Fill A, shape (6, 6, N), where it is not constant, from q (6, N)."""
     # Inputs
-    q2 = q[1]
-    q4 = q[2]
-    q5 = q[3]
-    q6 = q[4]
-    q7 = q[5]
+    q2, q4, q5, q6, q7 = q[1:]
     ZZ1R = X[0]
     XX2R = X[4]
     XY2R = X[5]
@@ -1387,11 +1374,7 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
 def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N)."""
     # Inputs
-    q2 = q[1]
-    q4 = q[2]
-    q5 = q[3]
-    q6 = q[4]
-    q7 = q[5]
+    q2, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP4, QP5, QP6, QP7 = qd
     FV1 = X[1]
     FS1 = X[2]
@@ -1680,11 +1663,7 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
 def _gravity_block(q, GAM, X, g):
     """Fill GAM, shape (6, N), where it is not constant, from q (6, N)."""
     # Inputs
-    q2 = q[1]
-    q4 = q[2]
-    q5 = q[3]
-    q6 = q[4]
-    q7 = q[5]
+    q2, q4, q5, q6, q7 = q[1:]
     OFFSET1 = X[3]
     MX2R = X[9]
     MY2 = X[10]

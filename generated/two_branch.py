@@ -388,11 +388,10 @@ def jacobian(
     GZ: float = -8.496
 ) -> np.ndarray:
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 7)."""
-    T = frame_poses(q, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8).reshape(-1, 8, 4, 4)
-    J = np.zeros((len(T), 6, 7))
-    last = 8 if frame is None else frame
-    P = T[:, last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    frame = 8 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8).reshape(-1, 8, 4, 4)
+    J, P = np.zeros((len(T), 6, 7)), T[:, frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
         v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
         for k, rate in rates:
@@ -1037,12 +1036,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ
 def _inertia_matrix_block(q, A, X, D2, RL2, D4, D6, D7, RL8):
     """Fill A, shape (7, 7, N), where it is not constant, from q (7, N)."""
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q6 = q[4]
-    q7 = q[5]
-    q8 = q[6]
+    q2, q3, q4, q6, q7, q8 = q[1:]
     ZZ1R = X[0]
     XX2R = X[6]
     XY2R = X[7]

@@ -242,11 +242,7 @@ def _regressor(q, qd, qdd, D3, RL4, g):
     D[46, 4] = 1.0
     D[57, 5] = 1.0
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6 = qd
     QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
     # Trigonometry
@@ -639,11 +635,7 @@ def _inverse_dynamics(q, qd, qdd, X, D3, RL4, g):
     """Joint torques Gamma. Shape (6, 1)."""
     GAM = ca.SX(6, 1)
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6 = qd
     QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
     (
@@ -879,11 +871,7 @@ def _inertia_matrix(q, X, D3, RL4):
     """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (6, 6)."""
     A = ca.SX(6, 6)
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     ZZ1R = X[0]
     XX2R = X[4]
     XY2 = X[5]
@@ -1159,11 +1147,7 @@ def _bias(q, qd, X, D3, RL4, g):
     """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (6, 1)."""
     GAM = ca.SX(6, 1)
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6 = qd
     FV1 = X[1]
     FS1 = X[2]
@@ -1429,11 +1413,7 @@ def _gravity(q, X, g):
     """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (6, 1)."""
     GAM = ca.SX(6, 1)
     # Inputs
-    q2 = q[1]
-    q3 = q[2]
-    q4 = q[3]
-    q5 = q[4]
-    q6 = q[5]
+    q2, q3, q4, q5, q6 = q[1:]
     OFFSET1 = X[3]
     MX2R = X[9]
     MY2 = X[10]
@@ -1664,10 +1644,10 @@ def _solved(A, b):
 
 def _jacobian(frame, q, D3, RL4):
     """Velocity of the origin of `frame`, then its angular velocity, in frame 0, per joint rate."""
-    T = _frame_poses(q, D3, RL4)
+    path, T = _paths()[frame], _frame_poses(q, D3, RL4)
     J = ca.SX(6, 6)
     P = T[frame - 1][:3, 3]
-    for j, sigma, rates in _paths()[frame]:
+    for j, sigma, rates in path:
         z = T[j - 1][:3, 2]
         v, w = (z, ca.SX(3, 1)) if sigma else (ca.cross(z, P - T[j - 1][:3, 3]), z)
         for k, rate in rates:

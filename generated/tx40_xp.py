@@ -340,13 +340,13 @@ def forward_dynamics(
 
 def jacobian(q: "Array", *, frame: int | None = None, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (..., 6, 6)."""
-    T = frame_poses(q, D3=D3, RL4=RL4)
+    frame = 6 if frame is None else frame
+    path, T = _paths()[frame], frame_poses(q, D3=D3, RL4=RL4)
     xp = array_namespace(T)
     still = xp.zeros_like(T[..., 0, :3, 2])
     linear, angular = [still] * 6, [still] * 6
-    last = 6 if frame is None else frame
-    P = T[..., last - 1, :3, 3]
-    for j, sigma, rates in _paths()[last]:
+    P = T[..., frame - 1, :3, 3]
+    for j, sigma, rates in path:
         z = T[..., j - 1, :3, 2]
         v, w = (z, still) if sigma else (xp.linalg.cross(z, P - T[..., j - 1, :3, 3]), z)
         for k, rate in rates:

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from runtime.errors import InputError
-    from runtime.estimators import estimate
     from runtime.estimators.essential import essential
     from runtime.estimators.estimate import Estimate
+    from runtime.estimators.methods import estimate
     from runtime.excitation.search import excite
     from runtime.identification.identification import Identification, identify
     from runtime.model.generated import load_model
@@ -58,9 +58,9 @@ __all__ = [
 
 _MODULES = {
     "runtime.errors": ("InputError",),
-    "runtime.estimators": ("estimate",),
     "runtime.estimators.essential": ("essential",),
     "runtime.estimators.estimate": ("Estimate",),
+    "runtime.estimators.methods": ("estimate",),
     "runtime.excitation.search": ("excite",),
     "runtime.identification.identification": ("Identification", "identify"),
     "runtime.model.generated": ("load_model",),

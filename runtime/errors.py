@@ -118,10 +118,10 @@ def settings_error(error: ValidationError, given: Any, path: tuple[str | int, ..
     first = problems[0][0]
     alike = [(place, reason) for place, reason in problems if place[: len(first)] == first]
     deepest = max((place for place, _ in alike), key=len)
-    reasons = list(dict.fromkeys(reason for place, reason in alike if place == deepest))
-    head, _, _ = reasons[0].partition("; expected ")
-    expected = " or ".join(reason.split("; expected ", 1)[-1] for reason in reasons)
-    return SettingsError(f"{head}; expected {expected}" if len(reasons) > 1 else reasons[0], path=(*path, *deepest))
+    reasons = [reason for place, reason in alike if place == deepest]
+    value = reasons[0].partition("; expected ")[0]
+    others = [reason.removeprefix(f"{value}; expected ") for reason in reasons[1:] if reason.startswith(f"{value}; expected ")]
+    return SettingsError(" or ".join(dict.fromkeys([reasons[0], *others])), path=(*path, *deepest))
 
 
 def shown(value: Any) -> str:

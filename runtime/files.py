@@ -1,4 +1,4 @@
-"""Bytes of a measured file, plain or compressed by gzip, and their hash."""
+"""Bytes of a measured file, plain or compressed by gzip, their hash, and how much a file may unpack to."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ import hashlib
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from io import BytesIO
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import BinaryIO, cast
 
 from runtime.errors import InputError
-from runtime.limits import PART, require_size
 
 WHOLE = 2**31  # bytes of a file that is read into memory; larger ones are read by blocks
+ALWAYS = 2**28  # bytes, 256 MiB: what any file may unpack to
+RATIO = 20  # times its size: what a larger one may unpack to; measured records reach 2 to 10
+PART = 2**20  # bytes read at a time
+GZIP = b"\x1f\x8b"  # first bytes
 
 
 def is_file(path: Path) -> bool:
@@ -29,46 +31,37 @@ def is_file(path: Path) -> bool:
 def require_file(path: Path) -> int:
     """Bytes of a file on disk; InputError for folders, and for pipes and devices, which may never answer or never end."""
     try:
-        found = path.stat()
+        status = path.stat()
     except (OSError, ValueError) as e:
         raise InputError(f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)) from e
-    if not S_ISREG(found.st_mode):
-        what = "a folder" if S_ISDIR(found.st_mode) else "a pipe or a device"
+    if not S_ISREG(status.st_mode):
+        what = "a folder" if S_ISDIR(status.st_mode) else "a pipe or a device"
         raise InputError(f"cannot be read: {what}; expected a file, copy its content into one", file=str(path))
-    return found.st_size
+    return status.st_size
 
 
-def read_bytes(path: Path) -> bytes:
-    """The uncompressed bytes of a file, recognised by its first two bytes, not by its name."""
-    if require_file(path) > WHOLE:
-        raise InputError(f"more than {WHOLE // 2**30} GiB; read it by blocks (stream: 65536 in the study file, or --block)", file=str(path))
-    try:
-        data = path.read_bytes()
-    except OSError as e:
-        raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
-    if data[:2] != b"\x1f\x8b":
-        return data
-    try:
-        parts, size = [], 0
-        with gzip.GzipFile(fileobj=BytesIO(data)) as packed:
-            while part := packed.read(PART):
-                parts.append(part)
-                size += len(part)
-                require_size(size, len(data), str(path))
-        return b"".join(parts)
-    except InputError:
-        raise
-    except (OSError, EOFError, zlib.error) as e:
-        raise InputError(f"damaged gzip file ({e}); copy it again", file=str(path)) from e
+def allowed(size: int) -> int:
+    """Bytes that a file of `size` bytes may unpack to."""
+    return max(ALWAYS, RATIO * size)
+
+
+def require_size(unpacked: int, size: int, file: str) -> None:
+    """Raise InputError where a file of `size` bytes would hold `unpacked` ones, more than a measured record ever does."""
+    if unpacked > allowed(size):
+        raise InputError(
+            f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; a record may be {ALWAYS // 2**20} MiB "
+            f"or {RATIO} times the size of its file: store it without compression if it is genuine",
+            file=file,
+        )
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """The uncompressed bytes of a file as a stream; what goes wrong while it is read names the file."""
+    """The uncompressed bytes of a file as a stream; an error while it is read names the file."""
     require_file(path)
     try:
         with path.open("rb") as plain:
-            if plain.peek(2)[:2] != b"\x1f\x8b":
+            if plain.peek(len(GZIP))[: len(GZIP)] != GZIP:
                 yield plain
                 return
             with gzip.GzipFile(fileobj=plain) as unpacked:
@@ -79,15 +72,41 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
 
 
+def is_packed(path: Path) -> bool:
+    """Whether a file is compressed by gzip: its first bytes say so, not its name."""
+    require_file(path)
+    try:
+        with path.open("rb") as plain:
+            return plain.read(len(GZIP)) == GZIP
+    except OSError as e:
+        raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
+
+
+def read_bytes(path: Path) -> bytes:
+    """The uncompressed bytes of a file."""
+    if require_file(path) > WHOLE:
+        raise InputError(f"more than {WHOLE // 2**30} GiB; read it by blocks (stream: 65536 in the study file, or --block)", file=str(path))
+    return b"".join(_parts(path))
+
+
 def sha256_of(path: Path) -> str:
-    """SHA-256 of the uncompressed bytes of a file of any size, 64 hexadecimal digits."""
-    with opened(path) as stream:
-        digest = hashlib.sha256()
-        while part := stream.read(2**20):
-            digest.update(part)
-        return digest.hexdigest()
+    """SHA-256 of the uncompressed bytes of a file, 64 hexadecimal digits. A file that unpacks to more than `allowed` is refused, part by part."""
+    digest = hashlib.sha256()
+    for part in _parts(path):
+        digest.update(part)
+    return digest.hexdigest()
 
 
 def sha256(data: bytes) -> str:
     """SHA-256 of bytes, 64 hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
+
+
+def _parts(path: Path) -> Iterator[bytes]:
+    """The uncompressed bytes of a file, part by part."""
+    size, total = require_file(path), 0
+    with opened(path) as stream:
+        while part := stream.read(PART):
+            total += len(part)
+            require_size(total, size, str(path))
+            yield part

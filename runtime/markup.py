@@ -32,11 +32,11 @@ def element(tag: str, *children: str, **attributes: str) -> Markup:
 
 def split(name: str) -> tuple[str, str]:
     """(letter, subscript) of a parameter or constant; the subscript may be empty."""
-    found = re.fullmatch(r"(.*?[^\d_])_?(\d*(?:_\d+)*)(R?)", name)
-    if found is None or not (found[2] or found[1] in FAMILIES):
+    match = re.fullmatch(r"(.*?[^\d_])_?(\d*(?:_\d+)*)(R?)", name)
+    if match is None or not (match[2] or match[1] in FAMILIES):
         return name, ""
-    letter, prefix = FAMILIES.get(found[1], (found[1], ""))
-    return letter, prefix + found[2] + found[3]
+    letter, prefix = FAMILIES.get(match[1], (match[1], ""))
+    return letter, prefix + match[2] + match[3]
 
 
 def symbol(name: str) -> Markup:
@@ -49,17 +49,17 @@ def formula(text: str) -> Markup:
     """A flat formula over + - * ** ( ) and functions: subscripts, exponents, thin spaces for products."""
     pieces: list[str] = []
     for token in TOKEN.finditer(text):
-        kind, found = token.lastgroup, token[0]
+        kind, piece = token.lastgroup, token[0]
         if kind == "power":
             pieces.append(element("sup", token["power"]))
         elif kind == "times":
             pieces.append("\u2009")
         elif kind == "sign":
-            pieces.append(found.replace("-", "\u2212"))
+            pieces.append(piece.replace("-", "\u2212"))
         elif kind == "name":
-            pieces.append("π" if found == "pi" else found if found in UPRIGHT else symbol(found))
+            pieces.append("π" if piece == "pi" else piece if piece in UPRIGHT else symbol(piece))
         else:
-            pieces.append(found)
+            pieces.append(piece)
     return element("span", *pieces, class_="formula")
 
 

@@ -30,9 +30,14 @@ class DescriptionError(SymgenError):
 
     Parameters
     ----------
-    message : what was given, what was expected and what to do.
-    path : keys that lead to the offending field, e.g. ("frames", 4, "sigma"); a file reader turns them into a line.
-    file, line : where; `line` counts from 1.
+    message : str
+        What was given, what was expected and what to do.
+    path : tuple of str or int
+        Keys that lead to the offending field, e.g. ("frames", 4, "sigma"); a file reader turns them into a line.
+    file : str, optional
+        Name of the file.
+    line : int, optional
+        Its line, from 1.
     """
 
     def __init__(self, message: str, *, path: tuple[str | int, ...] = (), file: str | None = None, line: int | None = None) -> None:
@@ -42,7 +47,19 @@ class DescriptionError(SymgenError):
 
 
 class ExpressionError(SymgenError):
-    """A text that is not an expression of the robot-file grammar; `column` counts from 1, `advice` ends the message."""
+    """A text that is not an expression of the robot-file grammar.
+
+    Parameters
+    ----------
+    message : str
+        What was found and what was expected.
+    text : str
+        The whole expression.
+    column : int, optional
+        Where in it, from 1.
+    advice : str
+        What to write instead; ends the message.
+    """
 
     def __init__(self, message: str, *, text: str, column: int | None = None, advice: str = "") -> None:
         self.text, self.column = text, column

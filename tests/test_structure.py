@@ -34,26 +34,21 @@ ONLY_IN = {  # library: files and folders that may import it
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/settings/yaml.py"),
     "sympy": ("symgen/regroup/formula.py",),
     "mpmath": ("symgen/derive/precise.py", "symgen/regroup/general.py"),
-    "casadi": ("symgen/derive/lagrange.py", "runtime/motion/", "runtime/excitation/search.py", "generated/"),
+    "casadi": ("symgen/derive/lagrange.py", "runtime/motion/", "runtime/excitation/optimiser.py", "generated/"),
     "pooch": ("runtime/records/datasets.py",),
     "pint": ("runtime/settings/units.py",),
     "mujoco": ("symgen/description/mjcf.py",),
     "polars": ("runtime/records/formats/parquet.py",),
     "h5py": ("runtime/records/formats/mat.py",),
     "rosbags": ("runtime/records/formats/bags.py",),
-    "cvxpy": ("runtime/estimators/semidefinite.py",),
+    "clarabel": ("runtime/estimators/semidefinite.py",),
     "array_api_compat": ("generated/",),
-    "dask": ("runtime/distributed.py",),
-    "distributed": ("runtime/distributed.py",),
-    "threadpoolctl": ("runtime/distributed.py",),
+    "dask": ("runtime/parallel.py",),
+    "distributed": ("runtime/parallel.py",),
+    "threadpoolctl": ("runtime/parallel.py",),
     "scipy": ("runtime/",),
 }
 LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be mended, then empty
-    "runtime.observation.by_blocks": {"runtime.estimators", "runtime.estimators.block_covariance"},
-    "symgen.demo.demonstration": {"symgen.cli.session"},
-    "symgen.demo.haptic": {f"symgen.cli.{name}" for name in ("session", "writing", "identify", "pages", "resolution_files")},
-    "symgen.demo.simulated_record": {"symgen.cli.session"},
-    "symgen.demo.tx40": {f"symgen.cli.{name}" for name in ("session", "writing", "identify", "pages", "resolution_files")},
 }
 FORBIDDEN_CALLS = {"eval", "exec", "sympify", "parse_expr", "__import__"}
 
@@ -99,11 +94,11 @@ def imports(name: str, *, at_run_time: bool = False) -> set[str]:
     return found
 
 
-def room(module: str) -> int:
-    """Place of a module in the order of its package; 0 for the ground, the last for the package itself."""
+def room(module: str) -> float:
+    """Place of a module in the order of its package; 0 for the ground. The package itself, the list of public names, stands before its users."""
     package, _, rest = module.partition(".")
     if not rest:
-        return len(ROOMS[package]) + 1
+        return ROOMS[package].index("demo") + 0.5 if "demo" in ROOMS[package] else len(ROOMS[package]) + 1
     first = rest.partition(".")[0]
     return ROOMS[package].index(first) + 1 if first in ROOMS[package] else 0
 

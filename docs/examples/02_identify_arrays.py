@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from runtime import Record, load_model, observe
+from runtime.estimators.methods import estimate_of
 from runtime.settings.study import study_from_mapping
-from runtime.estimators import estimate
 from symgen import generate_module, load_robot
 
 module = Path(tempfile.mkdtemp()) / "planar_2r.py"
@@ -25,6 +25,6 @@ tau = model.inverse_dynamics(q, qd, qdd, truth) + np.random.default_rng(0).norma
 
 record = Record(t, q, tau, rate=500.0)
 study = study_from_mapping({"signals": {"lowpass": {"cutoff": 20}}})
-found = estimate(observe(model, record, study), study.estimate, model=model)
+found = estimate_of(observe(model, record, study), study.estimate, model=model)
 for name, x, sigma, true in zip(found.names, found.X, found.sigma_corrected, truth, strict=True):
     print(f"{name:8} {x:9.4f} +- {sigma:.4f}   truth {true:9.4f}")

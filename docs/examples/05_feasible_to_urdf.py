@@ -1,4 +1,4 @@
-"""Parameters that a physical robot can have, written as a URDF (extra consistency)."""
+"""Parameters that a physical robot can have, written as a URDF."""
 
 import tempfile
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from runtime import Record, load_model, observe
+from runtime.estimators.methods import estimate_of
 from runtime.settings.study import study_from_mapping
-from runtime.estimators import estimate
 from symgen import generate_module, load_robot
 from symgen.description.urdf_write import write_urdf
 
@@ -25,7 +25,7 @@ tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(model.VALUES))
 record = Record(t, q, tau + np.random.default_rng(0).normal(0, 0.2, q.shape), rate=500.0)
 
 study = study_from_mapping({"signals": {"lowpass": {"cutoff": 20}}, "estimate": {"method": "feasible"}})
-found = estimate(observe(model, record, study), study.estimate, model=model)
+found = estimate_of(observe(model, record, study), study.estimate, model=model)
 text, not_carried = write_urdf(robot, found.details["standard"])  # one physical robot with these torques, of many
 print(text)
 print("A URDF does not carry:", *not_carried, sep="\n- ")

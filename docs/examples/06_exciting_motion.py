@@ -1,16 +1,13 @@
-"""A motion that tells the parameters apart, within the limits of the robot: the command from Python."""
+"""A motion that tells the parameters apart, within the limits of the robot: values of the robot file stand for those not yet identified."""
 
-import json
-import tempfile
-from pathlib import Path
+import runtime
+import symgen
+from runtime.settings.study import study_from_mapping
 
-from symgen.cli.main import app
-
-folder = Path(tempfile.mkdtemp())
-study = folder / "search.yaml"
-study.write_text("excitation: {parts: [{family: fourier, period: 5, harmonics: 3}], starts: 2, iterations: 50, rate: 200}\n")
-robot = folder / "arm.yaml"
-app(["convert", "planar_2r", str(robot)], standalone_mode=False)
-app(["excite", str(robot), str(study), "-o", str(folder / "out")], standalone_mode=False)
-found = json.loads((folder / "out" / "excitation.json").read_text())
-print(f"{found['duration']} s, condition {found['cond']:.1f}; predicted %sigma: {found['relative_sigma']}")
+model, casadi = symgen.model("planar_2r"), symgen.model("planar_2r", target="casadi")
+parts = [{"family": "fourier", "period": 5, "harmonics": 3}]
+study = study_from_mapping({"excitation": {"parts": parts, "starts": 2, "iterations": 50, "rate": 200}})
+result = runtime.excite(model, study=study, symbolic=casadi)
+print(result)
+t, q, qd, qdd, tau = result.sampled()
+print(f"{len(t)} samples, largest torques {abs(tau).max(axis=0).round(1)} N m")

@@ -1,16 +1,14 @@
-"""A record larger than memory: read by blocks, reduced to triangular factors, the same parameters."""
+"""A record larger than memory: read by blocks, the same parameters."""
 
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from runtime import load_model, observe
-from runtime.observation.by_blocks import reduce_records
+from runtime import estimate, load_model
 from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import open_streams
 from runtime.settings.study import study_from_mapping
-from runtime.estimators import estimate
 from symgen import generate_module, load_robot
 
 folder = Path(tempfile.mkdtemp())
@@ -26,7 +24,6 @@ tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(model.VALUES)) + 
 np.savetxt(folder / "log.csv", np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
 
 study = study_from_mapping({"record": {"files": ["log.csv"]}, "signals": {"lowpass": {"cutoff": 20}}})
-blocks = reduce_records(model, open_streams(study.record, model, folder=folder, block=1000), study)
-whole = observe(model, read_records(study.record, model, folder=folder)[0], study)
-by_blocks, at_once = (estimate(seen, study.estimate, model=model) for seen in (blocks, whole))
+by_blocks = estimate(model, open_streams(study.record, model, folder=folder, block=1000), study)
+at_once = estimate(model, read_records(study.record, model, folder=folder), study)
 print("largest difference, in sigma:", np.abs((by_blocks.X - at_once.X) / at_once.sigma).max())

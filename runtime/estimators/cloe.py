@@ -20,13 +20,13 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.estimators import iv, ols
-from runtime.estimators.block_covariance import block_covariance, block_of_rows, default_block
+from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.closed_loop import ClosedLoop, loop_of
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.fixed_point import Array, columns_of, full, initial
 from runtime.estimators.linear import assemble, outcome, standard_deviations
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation
+from runtime.observation.system import Observation, split_rows
 from runtime.settings.schema import Count, Positive, Real, Settings, structure
 from runtime.settings.study import EstimateSettings
 
@@ -109,7 +109,7 @@ def cloe(
     T = np.linalg.inv(np.linalg.qr(point.J * weights[:, None] * D, mode="r")) * D[:, None]
     r, c = point.J.shape
     C = T @ T.T * point.criterion(weights) / max(r - c, 1)
-    C_b = block_covariance(point.J, point.e * weights**2, block_of_rows(seen, default_block(seen)), T)
+    C_b = block_covariance(split_rows(np.column_stack([point.J, point.e]) * weights[:, None], seen.blocks()), np.zeros(c), T)
     found = assemble(replace(base, settings=settings, iterations=len(trail)), replace(first, X=point.X), model=model, provenance=provenance)
     status, message = outcome(base, first)
     parts = [message, loop.assumption]

@@ -30,8 +30,9 @@ from runtime.errors import InputError, SettingsError
 from runtime.model.generated import GeneratedModel
 from runtime.motion.reference import Reference, reference_of
 from runtime.observation.filters import States, decimated, filtered_states
-from runtime.observation.observation import LoopRows, Observation, decimated_torque, observation_from_states, stack
+from runtime.observation.observation import decimated_torque, observation_from_states
 from runtime.observation.rows import Selection, select_rows
+from runtime.observation.system import LoopRows, Observation, stack
 from runtime.records.record import Record
 from runtime.settings.controller import Controller
 from runtime.settings.study import Study

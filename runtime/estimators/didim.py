@@ -21,7 +21,7 @@ from runtime.estimators.estimate import Estimate
 from runtime.estimators.fixed_point import Array, Step, columns_of, iterate, options_of, told, trail_of
 from runtime.estimators.linear import System, assemble, standard_deviations
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation
+from runtime.observation.system import Observation
 from runtime.settings.study import EstimateSettings
 
 

@@ -13,13 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from runtime.estimators import linear_system
-from runtime.estimators.estimate import Estimate, json_text
+from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import System, assemble, standard_deviations
+from runtime.estimators.methods import linear_companion, linear_system, observed, simulator_of
+from runtime.json_documents import json_text
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation
-from runtime.observation.reduction import Reduction
-from runtime.settings.study import EssentialSettings, EstimateSettings
+from runtime.observation.system import Observation
+from runtime.records.record import Record
+from runtime.records.stream import Stream
+from runtime.settings.study import EssentialSettings, EstimateSettings, Study
 from runtime.table import aligned
 
 THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
@@ -88,7 +90,27 @@ class Essential:
 
 
 def essential(
-    observation: Observation | Reduction,
+    model: GeneratedModel, records: Record | Stream | Sequence[Record | Stream] | Observation, study: Study | None = None
+) -> Essential:
+    """Essential parameters of records, or of their Observation, by the method of the study or its linear companion.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        Emitted module.
+    records : Record, Stream, a sequence of them, or Observation
+        Joint side, SI.
+    study : Study, optional
+        Settings; default: Study().
+    """
+    study = study or Study()
+    if not isinstance(records, Observation):
+        records = observed(model, records, study, simulator=simulator_of(model, study))
+    return essential_of(records, study.essential, linear_companion(study.estimate), model=model)
+
+
+def essential_of(
+    observation: Observation,
     settings: EssentialSettings | None = None,
     estimate: EstimateSettings | None = None,
     *,
@@ -96,9 +118,22 @@ def essential(
     thresholds: Sequence[float] = THRESHOLDS,
     provenance: Mapping[str, Any] | None = None,
 ) -> Essential:
-    """Essential parameters of an observation by the method of `estimate` (ols or wls).
+    """Essential parameters of an observation.
 
-    thresholds : further ones, counted on the same trail.
+    Parameters
+    ----------
+    observation : Observation
+        Y = W X + rho.
+    settings : EssentialSettings, optional
+        Threshold on sigma_rho.
+    estimate : EstimateSettings, optional
+        A method that is one linear system.
+    model : GeneratedModel, optional
+        Gives units, joint numbers and the hash of the robot file.
+    thresholds : sequence of float
+        Further thresholds, counted on the same trail.
+    provenance : mapping, optional
+        Further entries for Estimate.provenance.
     """
     settings = settings or EssentialSettings()
     system = linear_system(observation, estimate or EstimateSettings())

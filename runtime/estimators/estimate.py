@@ -12,19 +12,14 @@ independent instead of samples (`runtime.estimators.block_covariance`). What a r
 
 from __future__ import annotations
 
-import dataclasses
-import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from runtime import json_values as read
-from runtime.errors import InputError
-from runtime.json_documents import document, read_document
+from runtime.json_documents import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text, json_text, read_text
 from runtime.latex import parameter_table
 from runtime.markup import number
 from runtime.table import Table, notebook
@@ -35,62 +30,105 @@ SCHEMA = "symgen-estimate/1"
 """Kind and version of the JSON layout, published as runtime/schemas/estimate.schema.json (`symgen schema --of estimate`)."""
 
 
+Status = Literal["ok", "rank-deficient", "no-redundancy", "singular-weights", "ill-posed", "not-converged", "weak-instruments"]
+"""Outcome of an estimator; the message of the Estimate explains."""
+
+
 @dataclass(frozen=True)
 class JointFit:
-    """Fit of the rows of one joint, torques in N m (N for prismatic joints).
+    """Fit of the rows of one joint.
 
-    rows : rows of the joint in W.
-    residual_norm : ||Y_j - W_j X||.
-    relative_error : 100 ||Y_j - W_j X|| / ||Y_j||, in %.
-    sigma_rho : ||Y_j - W_j X|| / sqrt(N_j (1 - b/r)), the share of joint j in eq. (9).
-    scale : the s_j its rows were divided by (1 without weights).
+    Attributes
+    ----------
+    joint : str
+        Label of the joint.
+    rows : int
+        Rows of the joint in W.
+    residual_norm : float, N m or N
+        ||Y_j - W_j X||.
+    relative_error : float, %
+        100 ||Y_j - W_j X|| / ||Y_j||.
+    sigma_rho : float
+        ||Y_j - W_j X|| / sqrt(N_j (1 - b/r)), the share of joint j in eq. (9).
+    scale : float, N m or N
+        s_j by which the rows were divided; 1 without weights.
     """
 
     joint: str
-    rows: int
-    residual_norm: float
-    relative_error: float
-    sigma_rho: float
-    scale: float = 1.0
+    rows: Whole
+    residual_norm: NanIfNull
+    relative_error: NanIfNull
+    sigma_rho: NanIfNull
+    scale: NanIfNull = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Parameters, their uncertainty and the quality of the fit.
+    """Parameters of a robot, their uncertainty and the quality of the fit.
 
-    names, X : parameters in column order; X, shape (b,), SI units (`units` by name where the model tells them).
-    sigma : ndarray, shape (b,), eq. (10); nan where the record does not determine the parameter.
-    covariance : ndarray, shape (b, b), eq. (10).
-    sigma_corrected : ndarray, shape (b,), sigma without the assumption of independent residuals.
-    sigma_rho : eq. (9) of the system that was solved: N m without weights, near 1 (no unit) with weights.
-    cond, cond_unit : condition number of that W, and of W with columns of norm 1; inf when rank-deficient.
-    rank : numerical rank judged with unit columns.
-    residual_norm, relative_error : ||Y - W X|| in N m and 100 ||Y - W X|| / ||Y|| in %, without weights.
-    per_joint : the same by joint.
-    status : "ok", "rank-deficient", "no-redundancy" (no more rows than parameters), "singular-weights" or "not-converged";
-        `message` explains.
-    groups : for "rank-deficient": the names that cannot be told apart, group by group.
-    settings, provenance : what was asked for; hashes, versions and seed that reproduce it.
-    details : what only this method tells, by name (feasible: standard parameters, eigenvalues, what least squares alone gave).
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters in column order; b of them.
+    X : ndarray, shape (b,), SI
+        Values.
+    sigma : ndarray, shape (b,), SI
+        Standard deviations, eq. (10); nan for a parameter that the record does not determine.
+    covariance : ndarray, shape (b, b), SI
+        Covariance of X, eq. (10).
+    sigma_corrected : ndarray, shape (b,), SI
+        Standard deviations without the assumption of independent residuals.
+    sigma_rho : float, N m or N
+        Eq. (9) of the system that was solved; with weights near 1 and without unit.
+    cond : float
+        Condition number of that W; inf where it is rank-deficient.
+    cond_unit : float
+        The same with columns of norm 1.
+    rank : int
+        Numerical rank with columns of norm 1.
+    residual_norm : float, N m or N
+        ||Y - W X||, without weights.
+    relative_error : float, %
+        100 ||Y - W X|| / ||Y||, without weights.
+    per_joint : tuple of JointFit
+        Fit by joint.
+    method : str
+        Estimator.
+    status : str
+        Outcome; no-redundancy: no more rows than parameters.
+    message : str
+        Explanation of the outcome.
+    groups : tuple of tuple of str
+        For rank-deficient: the names that cannot be told apart, group by group.
+    iterations : int
+        Number of passes.
+    settings : mapping
+        Settings of the study, complete.
+    provenance : mapping
+        Hashes, versions and seed that reproduce the result.
+    units : mapping of str
+        Units by name, such as kg*m**2.
+    details : mapping
+        Further results of the method, by name; of feasible: standard parameters, eigenvalues, the result of least squares alone.
     """
 
     names: tuple[str, ...]
-    X: Array
-    sigma: Array
-    covariance: Array
-    sigma_corrected: Array
-    sigma_rho: float
-    cond: float
-    cond_unit: float
-    rank: int
-    residual_norm: float
-    relative_error: float
+    X: Vector
+    sigma: Vector
+    covariance: Matrix
+    sigma_corrected: Vector
+    sigma_rho: NanIfNull
+    cond: InfIfNull
+    cond_unit: InfIfNull
+    rank: Whole
+    residual_norm: NanIfNull
+    relative_error: NanIfNull
     per_joint: tuple[JointFit, ...]
     method: str
-    status: str = "ok"
+    status: Status = "ok"
     message: str = ""
     groups: tuple[tuple[str, ...], ...] = ()
-    iterations: int = 0
+    iterations: Whole = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
@@ -106,13 +144,13 @@ class Estimate:
             object.__setattr__(self, name, array)
 
     @property
-    def relative_sigma(self) -> Array:
+    def relative_sigma(self) -> Vector:
         """%sigma of eq. (11), shape (b,), in %; inf for a parameter estimated as exactly zero."""
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return np.asarray(100 * self.sigma / np.abs(self.X))
 
     @property
-    def rows(self) -> int:
+    def rows(self) -> Whole:
         """Number of rows r of W."""
         return sum(fit.rows for fit in self.per_joint)
 
@@ -166,7 +204,7 @@ class Estimate:
 
         Raises InputError where the text is no JSON, of another schema or incomplete; `file` is the name it gives.
         """
-        return _estimate(document(text, SCHEMA, file), file)
+        return from_text(cls, text, SCHEMA, file)
 
     def to_table(self) -> str:
         """Plain text: one line per parameter, one per joint."""
@@ -219,88 +257,4 @@ class Estimate:
 
 def load_estimate(path: Path | str) -> Estimate:
     """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote; InputError as `Estimate.from_json`."""
-    return _estimate(read_document(Path(path), SCHEMA), str(path))
-
-
-def plain(value: Any) -> Any:
-    """`value` as JSON knows it: mappings, lists, text, finite numbers; what is not finite becomes null.
-
-    Dataclasses become mappings of their fields, arrays lists, anything else its text.
-    """
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, bool | int | str) else str(value)
-
-
-def json_text(value: Any) -> str:
-    """`plain(value)` as JSON, indented by two, lists of scalars on one line, with a final newline."""
-    return _render(plain(value), "") + "\n"
-
-
-def _render(value: Any, indent: str) -> str:
-    deeper = indent + "  "
-    if isinstance(value, dict) and value:
-        items = [f"{deeper}{json.dumps(key, ensure_ascii=False)}: {_render(item, deeper)}" for key, item in value.items()]
-        return "{\n" + ",\n".join(items) + f"\n{indent}}}"
-    if isinstance(value, list) and any(isinstance(item, list | dict) for item in value):
-        return "[\n" + ",\n".join(deeper + _render(item, deeper) for item in value) + f"\n{indent}]"
-    return json.dumps(value, allow_nan=False, ensure_ascii=False)
-
-
-MISSING = {"cond": math.inf, "cond_unit": math.inf, "sigma_rho": math.nan, "residual_norm": math.nan, "relative_error": math.nan}
-"""What null stands for in the numbers of an Estimate; in an array it is nan."""
-
-
-def _estimate(data: Mapping[str, Any], file: str) -> Estimate:
-    """The fields of a document, whose kind and version are right; InputError names the one that is not."""
-    given: dict[str, Any] = {}
-    for f in dataclasses.fields(Estimate):
-        if f.name not in data:
-            raise InputError(f"no {f.name!r}; the file is incomplete", file=file)
-        try:
-            given[f.name] = _field(f.name, data[f.name])
-        except (TypeError, ValueError) as e:
-            raise InputError(f"{f.name}: {e}; the file was changed", file=file) from e
-    try:
-        return Estimate(**given)
-    except ValueError as e:
-        raise InputError(f"{e}; the file was changed", file=file) from e
-
-
-def _field(name: str, value: Any) -> Any:
-    if name in MISSING:
-        return read.number(value, MISSING[name])
-    match name:
-        case "X" | "sigma" | "sigma_corrected":
-            return read.numbers(value)
-        case "covariance":
-            return read.numbers(value) if value else np.empty((0, 0))
-        case "names":
-            return read.texts(value)
-        case "method" | "status" | "message":
-            return read.text(value)
-        case "rank" | "iterations":
-            return read.whole(value)
-        case "groups":
-            return tuple(map(read.texts, read.items(value)))
-        case "per_joint":
-            return tuple(map(_joint_fit, read.items(value)))
-        case "units":
-            return {key: read.text(unit) for key, unit in read.mapping(value).items()}
-        case _:
-            return read.mapping(value)
-
-
-def _joint_fit(value: Any) -> JointFit:
-    given: dict[str, Any] = {}
-    for key, item in read.mapping(value).items():
-        given[key] = read.text(item) if key == "joint" else read.whole(item) if key == "rows" else read.number(item)
-    return JointFit(**given)
+    return from_text(Estimate, read_text(path), SCHEMA, str(path))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.semidefinite import FURTHEST, Distance, Found, Reference, Rows, closest, margin, solutions
+from runtime.estimators.semidefinite import FURTHEST, Distance, Optimum, Prior, Rows, closest, margin, solutions
 from runtime.model.inertia import INERTIAL, PhysicalModel
 from runtime.settings.schema import Positive, Real, Settings
 
@@ -49,7 +49,7 @@ class Limits(Settings):
     ----------
     bounds : mapping of pairs of float or None, SI
         [lowest, highest] of standard parameters, by name.
-    total_mass : float, pair of float, or None, kg
+    total_mass : float or pair of float or None, kg
         Mass of all links together, a number or [lowest, highest].
     centre : mapping of 3 pairs of float, m
         Box of the centre of mass, by link, in the link frame.
@@ -92,12 +92,12 @@ def feasibility(physical: PhysicalModel, names: Sequence[str], X: Array, limits:
     if not first.solved:
         raise InputError(unsolved(first.status, rows, lambda other: margin(physical.conditions, other, space)))
     blocking, conditions, found = [], list(physical.conditions), first
-    while found.solved and found.value < -ROUNDING and conditions:
+    while found.solved and found.margin < -ROUNDING and conditions:
         worst = max(found.duals, key=lambda name: found.duals[name])
-        blocking.append((worst, found.value))
+        blocking.append((worst, found.margin))
         conditions = [c for c in conditions if c.name != worst]
         found = margin(conditions, rows, space)
-    return Feasibility(first.value, not blocking, tuple(blocking), first.chi)
+    return Feasibility(first.margin, not blocking, tuple(blocking), first.chi)
 
 
 def standard_parameters(physical: PhysicalModel, names: Sequence[str], X: Array, limits: Limits | None = None) -> Array:
@@ -163,7 +163,7 @@ def scales(physical: PhysicalModel) -> Array:
     return np.array(sizes)
 
 
-def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Reference | None:
+def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
     """The pull to the values of the robot file; InputError where they are missing or not those of a body."""
     if kind == "none" or weight == 0:
         return None
@@ -178,10 +178,10 @@ def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Reference 
     if flat and kind != "euclidean":
         message = f"{kind} needs positive definite pseudo-inertias; the values of {', '.join(flat)} have none. Use prior: euclidean"
         raise SettingsError(message, path=("estimate", "options", "prior"))
-    return Reference(kind, chi0, scales(physical), numbers, weight)
+    return Prior(kind, chi0, scales(physical), numbers, weight)
 
 
-def unsolved(status: str, rows: Rows, attempt: Callable[[Rows], Found]) -> str:
+def unsolved(status: str, rows: Rows, attempt: Callable[[Rows], Optimum]) -> str:
     """What happened, the likely cause, what to try. attempt : the same problem with other rows; each limit is released in turn."""
     helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
     if helps:

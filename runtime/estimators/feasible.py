@@ -1,4 +1,4 @@
-"""Feasible least squares: the parameters nearest to the record that a physical robot can have (extra `consistency`).
+"""Feasible least squares: the parameters nearest to the record that a physical robot can have.
 
     min ||R (z - K chi)||^2 + weight D(chi)      subject to  P_j(chi) >= margin 1, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
@@ -33,15 +33,15 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.estimators import ols, wls
-from runtime.estimators.block_covariance import block_of_rows, default_block
+from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
 from runtime.estimators.linear import System, assemble
-from runtime.estimators.semidefinite import Distance, Found, Rows, closest, everything
+from runtime.estimators.semidefinite import Distance, Optimum, Rows, closest, everything
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import PhysicalModel, physical_model
-from runtime.observation.observation import Observation
 from runtime.observation.qr_factor import Array, Factor, factor
+from runtime.observation.system import Observation
 from runtime.settings.schema import NotNegative, Positive, Resamples, Seed, require, structure
 from runtime.settings.study import EstimateSettings
 
@@ -191,7 +191,7 @@ def fitted(R: Array, z: Array, physical: PhysicalModel, options: FeasibleOptions
     rows, space = limit_rows(physical, options), everything(scales(physical))
     pull = pulled(physical, options.prior, weight)
 
-    def attempt(within: Rows) -> Found:
+    def attempt(within: Rows) -> Optimum:
         return closest(R, z, physical.conditions, within, space, least=options.margin, pull=pull)
 
     found = attempt(rows)
@@ -206,19 +206,15 @@ def residual_norm(rows: Factor, X: Array) -> float:
 
 
 def bootstrapped(observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions, weight: float) -> Array:
-    """Scatter of X, shape (b,), over records whose blocks of time are drawn with replacement; weights of the joints stay."""
-    block = block_of_rows(observation, default_block(observation))
-    blocks = int(block.max()) + 1
-    rng = np.random.default_rng(options.seed)
+    """Deviation of X, shape (b,), over records of resampled blocks of time; weights of the joints stay."""
     fixed = options if options.prior == "none" else replace(options, weight=weight)
     K, names = physical.rows(system.names), system.names
-    W = observation.W[:, [observation.names.index(name) for name in names]]
-    runs = []
-    for _ in range(options.bootstrap):
-        times = np.sqrt(np.bincount(rng.integers(blocks, size=blocks), minlength=blocks))[block]
-        drawn = factor(W * times[:, None], observation.Y * times, observation.rows, names).weighted(1 / np.array(system.scales))
-        runs.append(K @ weighed(drawn, physical, fixed)[0])
-    return np.asarray(np.std(runs, axis=0, ddof=1))
+
+    def estimator(gram: Array) -> Array:
+        return np.asarray(K @ weighed(Factor(names, gram_root(gram), ()), physical, fixed)[0])
+
+    blocks = observation.block_rows(names, 1 / np.array(system.scales), observation.residual_block, system.whitener)
+    return np.asarray(np.std(drawn_again(blocks, estimator, options.bootstrap, options.seed), axis=0, ddof=1))
 
 
 def told(system: System, judged: str, active: list[str], estimate: Estimate, without: Estimate) -> str:

@@ -19,7 +19,8 @@ import numpy as np
 from runtime.errors import InputError, SettingsError
 from runtime.estimators import ols
 from runtime.estimators.closed_loop import ClosedLoop, Run
-from runtime.observation.observation import Observation
+from runtime.estimators.estimate import Status
+from runtime.observation.system import Observation
 from runtime.settings.schema import Count, Positive, Real, Settings, structure
 from runtime.settings.study import EstimateSettings
 
@@ -216,7 +217,7 @@ def _contraction(changes: Sequence[float]) -> float:
     return changes[-1] / changes[-2] if len(changes) > 1 and changes[-2] > 0 else float("nan")
 
 
-def told(loop: ClosedLoop, fixed: Fixed, options: FixedPointOptions, method: str) -> tuple[str, str]:
+def told(loop: ClosedLoop, fixed: Fixed, options: FixedPointOptions, method: str) -> tuple[Status, str]:
     """Status and message of an Estimate."""
     parts = [part for part in (fixed.message, loop.assumption) if part]
     if not fixed.converged:

@@ -24,13 +24,13 @@ import numpy as np
 
 from runtime.errors import SettingsError
 from runtime.estimators import wls
-from runtime.estimators.block_covariance import block_covariance, block_of_rows, default_block
+from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import System, assemble
 from runtime.estimators.solution import solve
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation
 from runtime.observation.qr_factor import Array, Factor, factor
+from runtime.observation.system import Observation, split_rows
 from runtime.settings.schema import Count, Positive, Settings, structure
 from runtime.settings.study import EstimateSettings
 
@@ -176,9 +176,10 @@ def _estimate(
     found = assemble(system, replace(system.solve(), X=fit.X), model=model, provenance=provenance)
     psi, inside = fit.w * fit.u, slope(fit.u, loss, tuning)
     C = fit.T @ fit.T.T * np.mean(psi**2) / np.mean(inside) ** 2 * r / max(r - b, 1)
-    block = default_block(observation) if options.block is None else options.block
-    residual = (observation.Y - W @ fit.X) * fit.w * np.repeat(fit.S**-2, observation.rows)
-    C_b = block_covariance(W, residual, block_of_rows(observation, block), fit.T / np.sqrt(np.mean(inside)))
+    # to first order about the fit, rows W/S sqrt(mean psi') and residuals psi/sqrt(mean psi')
+    bend, rows = np.sqrt(np.mean(inside)), np.repeat(1 / fit.S, observation.rows)
+    A = np.column_stack([W * rows[:, None] * bend, (observation.Y - W @ fit.X) * rows * fit.w / bend])
+    C_b = block_covariance(split_rows(A, observation.blocks(options.block)), np.zeros(b), fit.T / bend)
     shares = {joint.joint: float(np.mean(fit.w[observation.joint(j)] < DOWN)) for j, joint in enumerate(found.per_joint) if joint.rows}
     return replace(
         found,

@@ -21,18 +21,17 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError
-from scipy.sparse import csr_array
 from scipy.stats import chi2
 
 from runtime.errors import InputError
 from runtime.estimators import ols, wls
-from runtime.estimators.block_covariance import block_of_rows, default_block
+from runtime.estimators.block_covariance import deletions
 from runtime.estimators.closed_loop import Run, loop_of
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.fixed_point import Array, Step, columns_of, iterate, options_of, told, trail_of
 from runtime.estimators.linear import assemble, outcome
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation
+from runtime.observation.system import Observation, split_rows
 from runtime.settings.study import EstimateSettings
 
 CONDITION = 1e4
@@ -83,20 +82,22 @@ def iv(
     least = weighted.solve()
     told_first = outcome(weighted, least)
     found = assemble(replace(weighted, iterations=len(fixed.trail)), replace(least, X=X), model=model, provenance=provenance)
-    residual = (seen.Y - seen.W @ X) / np.repeat(s**2, seen.rows)
-    U, U_least = _by_block(seen, Z, residual) @ A.T, _by_block(seen, seen.W, residual) @ least.T @ least.T.T
+    rows = np.repeat(1 / s, seen.rows)
+    residual = (seen.Y - seen.W @ X) * rows
+    U = _by_block(seen, Z * rows[:, None], residual, A)
+    U_least = _by_block(seen, seen.W * rows[:, None], residual, least.T @ least.T.T)
     return replace(
         found,
         covariance=C,
         sigma=np.sqrt(np.diag(C)),
-        sigma_corrected=np.sqrt(_scale(seen, len(names)) * np.einsum("kb,kb->b", U, U)),
+        sigma_corrected=np.linalg.norm(U, axis=0),
         status=status if told_first[0] == "ok" else told_first[0],
         message=" ".join(part for part in (told_first[1], message) if part),
         details={
             "trail": trail_of(fixed),
             "contraction": fixed.contraction,
             **quality,
-            "hausman": hausman(names, X - least.X, np.sqrt(_scale(seen, len(names))) * (U - U_least)),
+            "hausman": hausman(names, X - least.X, U - U_least),
         },
     )
 
@@ -152,14 +153,11 @@ def _quality(seen: Observation, Z: Array, s: Array) -> dict[str, float]:
     }
 
 
-def _by_block(seen: Observation, Z: Array, residual: Array) -> Array:
-    """g_k = Z_k'(V (Y - W X))_k of every block k, shape (K, b); residual: V (Y - W X)."""
-    blocks = block_of_rows(seen, default_block(seen))
-    r, K = len(residual), int(blocks.max()) + 1
-    return np.asarray(csr_array((residual, (blocks, np.arange(r))), shape=(K, r)) @ Z)
+def _by_block(seen: Observation, Z: Array, residual: Array, A: Array) -> Array:
+    """Change of X = A Z'Y by each block left out (`runtime.estimators.block_covariance`), shape (K, b), times sqrt((K - 1)/K); nan for one block.
 
-
-def _scale(seen: Observation, b: int) -> float:
-    """Correction of `runtime.estimators.block_covariance` for residuals that a fit has shrunk; nan where it has none."""
-    r, K = len(seen.Y), int(block_of_rows(seen, default_block(seen)).max()) + 1
-    return K / (K - 1) * (r - 1) / (r - b) if K > 1 and r > b else float("nan")
+    Z, residual : weighted rows of the instruments, shape (r, b), and Y - W X, shape (r,).
+    """
+    R = np.asarray(np.linalg.qr(Z, mode="r"))
+    U = deletions(split_rows(np.column_stack([Z, residual]), seen.blocks()), np.zeros(Z.shape[1]), np.linalg.inv(R), A @ R.T)
+    return U if len(U) > 1 else np.full_like(U, np.nan)

@@ -15,13 +15,12 @@ import numpy as np
 import scipy
 
 from runtime.errors import SettingsError
-from runtime.estimators.block_covariance import block_covariance, block_of_rows, default_block, score_covariance
-from runtime.estimators.estimate import Estimate, JointFit
+from runtime.estimators.block_covariance import block_covariance
+from runtime.estimators.estimate import Estimate, JointFit, Status
 from runtime.estimators.solution import Solution, solve
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation
-from runtime.observation.qr_factor import Array, Factor, factor
-from runtime.observation.reduction import Reduction
+from runtime.observation.qr_factor import Array, Factor
+from runtime.observation.system import Observation
 from runtime.settings.study import EstimateSettings, to_mapping
 
 OPTIONS = ("rank_tolerance", "block")
@@ -32,14 +31,14 @@ OPTIONS = ("rank_tolerance", "block")
 class System:
     """The factored rows of one observation.
 
-    observation : the rows, all columns; or what is left of them.
+    observation : the rows, all columns.
     raw : factor of [W Y]; weighted : factor of the system that is solved. Both hold the columns still in play.
     scales : s_j of each joint, by which its rows are divided; 1 without weights.
     whitener : ndarray, shape (n, n), that multiplies the n rows of one instant instead, or None.
     known_variance : C = (W'W)^-1 of the weighted system, as its rows have variance 1; else C = sigma_rho^2 (W'W)^-1.
     """
 
-    observation: Observation | Reduction
+    observation: Observation
     settings: EstimateSettings
     raw: Factor
     weighted: Factor
@@ -47,7 +46,7 @@ class System:
     whitener: Array | None = None
     known_variance: bool = False
     iterations: int = 0
-    status: str = "ok"
+    status: Status = "ok"
     message: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
 
@@ -81,19 +80,15 @@ def checked_options(settings: EstimateSettings, known: Sequence[str] = OPTIONS) 
     return settings.options
 
 
-def raw_factor(observation: Observation | Reduction, settings: EstimateSettings) -> Factor:
+def raw_factor(observation: Observation, settings: EstimateSettings) -> Factor:
     """Factor of [W Y] on the columns that `settings` asks for."""
-    if isinstance(observation, Reduction):
-        full = observation.factor
-    else:
-        full = factor(observation.W, observation.Y, observation.rows, observation.names)
     if settings.columns == "all":
-        return full
+        return observation.factor
     unknown = [name for name in settings.columns if name not in observation.names]
     if unknown:
         message = f"no parameter {', '.join(unknown)}; the model has {', '.join(observation.names)}"
         raise SettingsError(message, path=("estimate", "columns"))
-    return full.select(settings.columns)
+    return observation.factor.select(settings.columns)
 
 
 def standard_deviations(system: System, fit: Solution) -> tuple[float, Array]:
@@ -157,26 +152,16 @@ def assemble(
 
 
 def correlated_covariance(system: System, fit: Solution) -> tuple[float, Array]:
-    """Length of the blocks of residuals, s, and the covariance that takes blocks as independent, shape (b, b)."""
-    observation = system.observation
-    columns = [observation.names.index(name) for name in system.names]
-    weights = 1 / np.square(system.scales)
-    if isinstance(observation, Reduction):
-        X = np.zeros(len(observation.names))
-        X[columns] = fit.X
-        g = observation.scores(X, weights)[:, columns]
-        return observation.residual_block, score_covariance(g, system.raw.rows, fit.T)
-    W = observation.W if system.names == observation.names else observation.W[:, columns]
-    residual = observation.Y - W @ fit.X
-    block = float(system.options.get("block", default_block(observation)))
-    blocks = block_of_rows(observation, block)
-    if system.whitener is None:
-        return block, block_covariance(W, residual * np.repeat(weights, observation.rows), blocks, fit.T)
-    whole = whitened(np.column_stack([W, residual]), system.whitener)
-    return block, block_covariance(whole[:, :-1], whole[:, -1], blocks, fit.T)
+    """Length of the blocks of residuals, s, and the covariance that takes blocks as independent, shape (b, b); nan without redundancy."""
+    observation, b = system.observation, len(system.names)
+    block = float(system.options.get("block", observation.residual_block))
+    if system.raw.rows <= b:
+        return block, np.full((b, b), np.nan)
+    rows = observation.block_rows(system.names, 1 / np.array(system.scales), block, system.whitener)
+    return block, block_covariance(rows, fit.X, fit.T)
 
 
-def outcome(system: System, fit: Solution) -> tuple[str, str]:
+def outcome(system: System, fit: Solution) -> tuple[Status, str]:
     """Status and the paragraph that explains it."""
     b = len(system.names)
     if fit.rank < b:
@@ -202,13 +187,7 @@ def outcome(system: System, fit: Solution) -> tuple[str, str]:
     return system.status, system.message
 
 
-def whitened(A: Array, whitener: Array) -> Array:
-    """A, shape (n*N, c) joint-major, with the n rows of each instant multiplied by `whitener`, shape (n, n)."""
-    n = len(whitener)
-    return np.asarray(np.einsum("ij,jNc->iNc", whitener, A.reshape(n, -1, A.shape[1])).reshape(A.shape))
-
-
-def describe(observation: Observation | Reduction, model: GeneratedModel | None = None) -> dict[str, Any]:
+def describe(observation: Observation, model: GeneratedModel | None = None) -> dict[str, Any]:
     """Provenance: hashes of the robot file and of the measured files, versions that computed."""
     try:
         own = version("symgen")

@@ -8,11 +8,10 @@ from __future__ import annotations
 from runtime.errors import SettingsError
 from runtime.estimators.linear import System, checked_options, raw_factor
 from runtime.observation.observation import Observation
-from runtime.observation.reduction import Reduction
 from runtime.settings.study import EstimateSettings
 
 
-def system(observation: Observation | Reduction, settings: EstimateSettings) -> System:
+def system(observation: Observation, settings: EstimateSettings) -> System:
     """The rows as they are."""
     if settings.weights != "none":
         raise SettingsError(f"{settings.weights!r} with method ols; weights belong to method wls", path=("estimate", "weights"))

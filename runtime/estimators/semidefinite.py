@@ -1,31 +1,38 @@
-"""Semidefinite programs over the standard parameters: cvxpy and Clarabel, extra `consistency`. cvxpy only here.
+"""Semidefinite programs over the standard parameters, as cone programs for Clarabel.
 
     closest     min ||R chi - z||^2 + weight D(chi)    subject to  P >= least 1 of every condition, rows, chi in a Space
     margin      max t                                  subject to  P >= t 1 of every condition, rows, chi in a Space
 
-The unknowns w of chi = origin + basis w have sizes near one, as interior point methods want. K chi = X is a Space, not an equation, and holds to
+Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of chi = origin + basis w, with sizes near one as
+interior point methods want, then what the criterion adds: residuals y with y = R chi - z as an equation, so that R is not squared. A symmetric
+matrix enters by the columns of its upper triangle, entries off the diagonal times sqrt(2). K chi = X is a Space, not an equation, and holds to
 rounding. Clarabel is deterministic: same problem, same bits.
 
-Reference: Goulart and Chen (2024) for Clarabel; Diamond and Boyd (2016) for cvxpy.
+    entropic distance, without its constants     tr M - log det M,  M = L P L' with P0 = (L'L)^-1
+    log det M = max sum_i log Z_ii               [[M, Z], [Z', diag(Z_ii)]] >= 0,  Z lower triangular
+
+Reference: Goulart and Chen (2024) for Clarabel; Boyd and Vandenberghe, Convex Optimization (2004), for the cones.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import clarabel
 import numpy as np
+from scipy import sparse
 from scipy.linalg import null_space
 
-from runtime.errors import InputError
 from runtime.model.inertia import Condition
 
 Array = np.ndarray
 Distance = Literal["none", "euclidean", "entropic", "pullback"]
 
 TOLERANCES = ((1e-12, 1e-11), (1e-9, 1e-9))  # of the gap and of the constraints, tried in this order
+STATUS = {"Solved": "optimal", "AlmostSolved": "optimal_inaccurate", "PrimalInfeasible": "infeasible", "AlmostPrimalInfeasible": "infeasible_inaccurate",
+          "DualInfeasible": "unbounded", "AlmostDualInfeasible": "unbounded_inaccurate"}  # fmt: skip
 SOLVED = ("optimal", "optimal_inaccurate")
 FURTHEST = 1.0  # largest margin, SI, and ...
 LARGEST = 1e4  # largest unknown, in units of its size: the problem of `margin` has a solution whatever K leaves open
@@ -76,26 +83,49 @@ def within(space: Space, rows: Rows) -> tuple[Space, Rows]:
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
-    """Where the inertial parameters are pulled to, chi0 (p,), in units of scale, (p,)."""
+class Prior:
+    """Pull of the inertial parameters towards chi0.
+
+    Attributes
+    ----------
+    kind : str
+        Distance D.
+    chi0 : ndarray, shape (p,), SI
+        Where they are pulled to.
+    scale : ndarray, shape (p,), SI
+        Units of the euclidean distance.
+    numbers : tuple of int
+        Numbers of the inertial parameters among the p.
+    weight : float
+        Weight of D.
+    """
 
     kind: Distance
     chi0: Array
     scale: Array
-    numbers: tuple[int, ...]  # the inertial parameters among the p
+    numbers: tuple[int, ...]
     weight: float
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """status : "optimal", "optimal_inaccurate", "infeasible", ... of the solver.   chi : (p,), nan without solution.
+class Optimum:
+    """Result of a program.
 
-    duals : trace of the multiplier of each condition, their sum 1 in a problem of `margin`: what stands in the way.
+    Attributes
+    ----------
+    status : str
+        "optimal", "optimal_inaccurate", "infeasible", ..., or the solver's own word.
+    chi : ndarray, shape (p,), SI
+        Standard parameters; nan without solution.
+    margin : float, SI
+        t of a problem of `margin`; nan of others.
+    duals : mapping of str to float
+        Trace of the multiplier of each condition, their sum 1 in a problem of `margin`: what stands in the way.
     """
 
     status: str
     chi: Array
-    value: float
+    margin: float
     duals: Mapping[str, float]
 
     @property
@@ -104,16 +134,89 @@ class Found:
         return self.status in SOLVED
 
 
-def require_solver() -> Any:
-    """cvxpy with Clarabel; InputError that says how to get them."""
-    try:
-        import cvxpy
-    except ImportError:
-        raise InputError("physical consistency needs cvxpy; pip install symgen[consistency]") from None
-    installed: Any = cvxpy.installed_solvers
-    if cvxpy.CLARABEL not in installed():
-        raise InputError("physical consistency needs the solver Clarabel; pip install symgen[consistency]")
-    return cvxpy
+class Program:
+    """A cone program in w of chi = origin + basis w and `more` further unknowns, built constraint by constraint."""
+
+    def __init__(self, space: Space, more: int) -> None:
+        self.space, self.m = space, space.basis.shape[1]
+        self.quadratic, self.linear = np.zeros(self.m + more), np.zeros(self.m + more)
+        self.constraints: list[tuple[Any, Array, Array]] = []  # cone, A, b: b + A x in the cone
+        self.multipliers: dict[str, slice] = {}  # of each condition
+
+    def unknowns(self, count: int) -> Array:
+        """The matrix with which zeros stand for x in `count` rows."""
+        return np.zeros((count, len(self.linear)))
+
+    def of_chi(self, M: Array) -> tuple[Array, Array]:
+        """M chi as A x + b, M of shape (k, p): A and b."""
+        A = self.unknowns(len(M))
+        A[:, : self.m] = M @ self.space.basis
+        return A, M @ self.space.origin
+
+    def conditions_hold(self, conditions: Sequence[Condition], least: float) -> None:
+        """P >= least 1 of every condition; of least 0: P >= t 1, t the last unknown, in a problem of `margin`."""
+        start = sum(len(b) for _, _, b in self.constraints)
+        for c in conditions:
+            n, one = c.B.shape[1], triangle(np.eye(c.B.shape[1])[None])[:, 0]
+            A, b = self.of_chi(on_standard(triangle(c.B), c.numbers, len(self.space.origin)))
+            if not least:
+                A[:, -1] = -one
+            self.constraints.append((clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1), A, b - least * one))
+            self.multipliers[c.name] = slice(start, start := start + len(one))
+
+    def rows_hold(self, rows: Rows) -> None:
+        """lower <= A chi <= upper."""
+        A, b = self.of_chi(rows.A)
+        for sign, bound in ((1.0, rows.lower), (-1.0, rows.upper)):
+            given = np.isfinite(bound)
+            self.at_least_zero(sign * A[given], sign * (b - bound)[given])
+
+    def at_least_zero(self, A: Array, b: Array) -> None:
+        """A x + b >= 0, row by row."""
+        if len(b):
+            self.constraints.append((clarabel.NonnegativeConeT(len(b)), A, b))
+
+    def add_squares(self, first: int, M: Array, z: Array, weight: float) -> None:
+        """weight ||M chi - z||^2 in the criterion; the residual are unknowns from number `first` on."""
+        A, b = self.of_chi(M)
+        own = np.arange(first, first + len(z))
+        A[np.arange(len(z)), own] = -1.0
+        self.quadratic[own] = 2 * weight
+        self.constraints.append((clarabel.ZeroConeT(len(z)), A, b - z))
+
+    def add_entropy(self, first: int, B: Array, numbers: Sequence[int], weight: float) -> None:
+        """weight (tr M - log det M) in the criterion, M = sum_k chi[numbers[k]] B[k], shape (n, n); Z and log Z_ii are unknowns from `first` on."""
+        n, p = B.shape[1], len(self.space.origin)
+        i, j = np.tril_indices(n)
+        A, b = self.of_chi(on_standard(triangle(np.pad(B, ((0, 0), (0, n), (0, n)))), numbers, p))
+        Z = np.zeros((len(i), 2 * n, 2 * n))
+        Z[np.arange(len(i)), i, n + j] = Z[np.arange(len(i)), n + j, i] = 1.0
+        Z[i == j, n + i[i == j], n + i[i == j]] = 1.0
+        A[:, first : first + len(i)] = triangle(Z)
+        self.constraints.append((clarabel.PSDTriangleConeT(2 * n), A, b))
+        for k, place in enumerate(np.flatnonzero(i == j)):
+            logarithm, E = first + len(i) + k, self.unknowns(3)
+            E[0, logarithm] = E[2, first + place] = 1.0
+            self.constraints.append((clarabel.ExponentialConeT(), E, np.array([0.0, 1.0, 0.0])))
+            self.linear[logarithm] = -weight
+        self.linear[: self.m] += weight * np.trace(B, axis1=1, axis2=2) @ self.space.basis[list(numbers)]
+
+    def solve(self) -> tuple[str, Array, dict[str, float]]:
+        """Status, x, and the trace of the multiplier of each condition."""
+        cones, A, b = zip(*self.constraints, strict=True)
+        Q, given = sparse.diags(self.quadratic, format="csc"), sparse.csc_matrix(-np.vstack(A))
+        status = ""
+        for gap, feasible in TOLERANCES:
+            settings = clarabel.DefaultSettings()
+            settings.verbose = False
+            settings.tol_gap_abs = settings.tol_gap_rel = gap
+            settings.tol_feas = feasible
+            solution = clarabel.DefaultSolver(Q, self.linear, given, np.concatenate(b), list(cones), settings).solve()
+            status = STATUS.get(str(solution.status), f"Clarabel: {solution.status}")
+            if status in SOLVED:
+                z = np.array(solution.z)
+                return status, np.array(solution.x), {name: trace(z[rows]) for name, rows in self.multipliers.items()}
+        return status, np.full(len(self.linear), np.nan), {}
 
 
 def closest(
@@ -124,86 +227,72 @@ def closest(
     space: Space,
     *,
     least: float,
-    pull: Reference | None = None,
-) -> Found:
+    pull: Prior | None = None,
+) -> Optimum:
     """chi of `space` nearest to R chi = z, shapes (m, p) and (m,), scaled by the caller so that ||z|| is about 1.
 
-    least : smallest eigenvalue of every condition, SI.
+    least : smallest eigenvalue of every condition, SI, not zero.
     """
-    cp = require_solver()
     space, rows = within(space, rows)
-    w = cp.Variable(space.basis.shape[1])
-    chi = space.origin + space.basis @ w
-    constraints, blocks = _constraints(cp, chi, conditions, rows, least)
-    criterion = cp.sum_squares((R @ space.basis) @ w - (z - R @ space.origin))
-    if pull is not None:
-        criterion = criterion + pull.weight * _distance(cp, chi, conditions, pull)
-    return _solved(cp, cp.Problem(cp.Minimize(criterion), constraints), w, space, blocks)
-
-
-def margin(conditions: Sequence[Condition], rows: Rows, space: Space) -> Found:
-    """The largest t with every P - t 1 positive semidefinite: `value`; negative where no physical robot is in `space`."""
-    cp = require_solver()
-    space, rows = within(space, rows)
-    w, t = cp.Variable(space.basis.shape[1]), cp.Variable()
-    constraints, blocks = _constraints(cp, space.origin + space.basis @ w, conditions, rows, t)
-    return _solved(cp, cp.Problem(cp.Maximize(t), [*constraints, t <= FURTHEST, w <= LARGEST, w >= -LARGEST]), w, space, blocks)
-
-
-def _constraints(cp: Any, chi: Any, conditions: Sequence[Condition], rows: Rows, least: Any) -> tuple[list[Any], dict[str, Any]]:
-    """Conditions and rows; the conditions also by name."""
-    blocks = {}
-    for c in conditions:
-        P = _matrix(cp, chi, c)
-        m = c.B.shape[1]
-        blocks[c.name] = P - least * np.eye(m) >> 0 if m > 1 else P[0, 0] >= least
-    constraints = list(blocks.values())
-    for A, low, high in zip(rows.A, rows.lower, rows.upper, strict=True):
-        constraints += [A @ chi >= low] if np.isfinite(low) else []
-        constraints += [A @ chi <= high] if np.isfinite(high) else []
-    return constraints, blocks
-
-
-def _matrix(cp: Any, chi: Any, c: Condition) -> Any:
-    """sum_k chi_k B_k as an expression."""
-    m = c.B.shape[1]
-    return cp.reshape(c.B.reshape(len(c.numbers), m * m).T @ chi[list(c.numbers)], (m, m), order="C")
-
-
-def _distance(cp: Any, chi: Any, conditions: Sequence[Condition], pull: Reference) -> Any:
-    """D(chi): ||(chi - chi0)/scale||^2 over the inertial parameters; or over the links
-
-    entropic  tr(P0^-1 P) - log det P + log det P0 - 4        pullback  tr((P0^-1 (P - P0))^2)/2 = ||P0^-1/2 (P - P0) P0^-1/2||^2 / 2
-    """
-    numbers = list(pull.numbers)
-    if pull.kind == "euclidean":
-        return cp.sum_squares(cp.multiply(1 / pull.scale[numbers], chi[numbers] - pull.chi0[numbers]))
-    total: Any = 0.0
-    for c in conditions:
-        if c.name.startswith("link "):
+    squares, entropies = [(R, z, 1.0)], []
+    if pull is not None and pull.kind == "euclidean":
+        numbers = list(pull.numbers)
+        squares.append((np.eye(len(pull.chi0))[numbers] / pull.scale[numbers, None], (pull.chi0 / pull.scale)[numbers], pull.weight))
+    elif pull is not None:
+        for c in (c for c in conditions if c.name.startswith("link ")):
             L = np.linalg.inv(np.linalg.cholesky(c.matrix(pull.chi0)))
-            whitened = L @ _matrix(cp, chi, c) @ L.T  # the identity at chi0
-            whitened = (whitened + whitened.T) / 2
+            B = L @ c.B @ L.T  # the identity at chi0
+            B = (B + B.swapaxes(1, 2)) / 2
             if pull.kind == "entropic":
-                total = total + cp.trace(whitened) - cp.log_det(whitened) - 4.0
+                entropies.append((B, c.numbers))
             else:
-                total = total + cp.sum_squares(whitened - np.eye(4)) / 2
-    return total
+                M = on_standard(triangle(B), c.numbers, len(pull.chi0))
+                squares.append((M, triangle(np.eye(4)[None])[:, 0], pull.weight / 2))
+    residuals = sum(len(value) for _, value, _ in squares)
+    program = Program(space, residuals + sum(14 for _ in entropies))
+    program.conditions_hold(conditions, least)
+    program.rows_hold(rows)
+    first = program.m
+    for M, value, weight in squares:
+        program.add_squares(first, M, value, weight)
+        first += len(value)
+    for B, numbers_of_link in entropies:
+        assert pull is not None
+        program.add_entropy(first, B, numbers_of_link, pull.weight)
+        first += 14  # Z of a pseudo-inertia, (4, 4), and four logarithms
+    status, x, duals = program.solve()
+    return Optimum(status, space.origin + space.basis @ x[: program.m], float("nan"), duals)
 
 
-def _solved(cp: Any, problem: Any, w: Any, space: Space, blocks: Mapping[str, Any]) -> Found:
-    status = ""
-    for gap, feasible in TOLERANCES:
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # "may be inaccurate": the status says it
-                problem.solve(solver=cp.CLARABEL, tol_gap_abs=gap, tol_gap_rel=gap, tol_feas=feasible)
-            status = problem.status
-        except cp.error.SolverError:
-            status = "Clarabel failed"
-        if status in SOLVED:
-            break
-    if status not in SOLVED:
-        return Found(status, np.full(len(space.origin), np.nan), float("nan"), {})
-    duals = {name: float(np.trace(np.atleast_2d(block.dual_value))) for name, block in blocks.items()}
-    return Found(status, space.origin + space.basis @ w.value, float(problem.value), duals)
+def margin(conditions: Sequence[Condition], rows: Rows, space: Space) -> Optimum:
+    """The largest t with every P - t 1 positive semidefinite: `margin`; negative where no physical robot is in `space`."""
+    space, rows = within(space, rows)
+    program = Program(space, 1)
+    program.linear[-1] = -1.0
+    program.conditions_hold(conditions, 0.0)
+    program.rows_hold(rows)
+    bounds = np.full(program.m + 1, LARGEST)
+    bounds[-1] = FURTHEST
+    program.at_least_zero(-np.eye(program.m + 1), bounds)
+    program.at_least_zero(np.eye(program.m + 1)[:-1], bounds[:-1])
+    status, x, duals = program.solve()
+    return Optimum(status, space.origin + space.basis @ x[:-1], float(x[-1]), duals)
+
+
+def triangle(B: Array) -> Array:
+    """Columns of the upper triangles of symmetric matrices, shape (k, n, n), entries off the diagonal times sqrt(2): shape (n (n + 1)/2, k)."""
+    j, i = np.tril_indices(B.shape[1])
+    return np.asarray((B[:, i, j] * np.where(i == j, 1.0, np.sqrt(2.0))).T)
+
+
+def trace(z: Array) -> float:
+    """Trace of a symmetric matrix from its triangle."""
+    ends = np.cumsum(np.arange(1, len(z) + 1)) - 1  # places of the diagonal
+    return float(z[ends[ends < len(z)]].sum())
+
+
+def on_standard(M: Array, numbers: Sequence[int], p: int) -> Array:
+    """Columns of M, shape (k, len(numbers)), as those of all p standard parameters, shape (k, p)."""
+    spread = np.zeros((len(M), p))
+    spread[:, list(numbers)] = M
+    return spread

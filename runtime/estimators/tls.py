@@ -30,12 +30,12 @@ from scipy.linalg import solve_triangular
 
 from runtime.errors import SettingsError
 from runtime.estimators import ols, wls
-from runtime.estimators.block_covariance import block_of_rows, default_block
+from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import System, assemble
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation
 from runtime.observation.qr_factor import Array, triangularise
+from runtime.observation.system import Observation, split_rows
 from runtime.settings.schema import NotNegative, PerJoint, Positive, Real, Resamples, Seed, Settings, structure
 from runtime.settings.study import EstimateSettings
 
@@ -58,7 +58,7 @@ class TlsOptions(Settings):
     ----------
     position_error : float, rad or m
         Deviation of one raw position on the side cestac.side.
-    torque_error : float, tuple of float, or None, N m or N
+    torque_error : float or tuple of float or None, N m or N
         Deviation t_j of the torque of each joint; default: from the residuals.
     bootstrap : int
         Resampled records behind `sigma`; 0: that of least squares.
@@ -233,16 +233,10 @@ def total(R: Array, split: Split, L: Array) -> Solved:
 
 
 def bootstrap_covariance(seen: Observation, split: Split, t: Array, options: TlsOptions) -> Array:
-    """Covariance of X over resampled blocks of time, shape (b, b), from one triangular factor per block."""
-    A, L = _rows(seen, split, t), error_root(seen, split, t)
-    blocks = block_of_rows(seen, default_block(seen) if options.block is None else options.block)
-    count = int(blocks.max()) + 1
-    factors = [triangularise(A[blocks == k]) for k in range(count)]
-    rng = np.random.default_rng(options.seed)
-    found = [
-        total(triangularise(np.vstack([factors[k] for k in rng.integers(count, size=count)])), split, L).X for _ in range(options.bootstrap)
-    ]
-    return np.atleast_2d(np.cov(np.array(found), rowvar=False))
+    """Covariance of X over records of resampled blocks of time, shape (b, b)."""
+    blocks, L = split_rows(_rows(seen, split, t), seen.blocks(options.block)), error_root(seen, split, t)
+    X = drawn_again(blocks, lambda gram: total(gram_root(gram), split, L).X, options.bootstrap, options.seed)
+    return np.atleast_2d(np.cov(X, rowvar=False))
 
 
 def _rows(seen: Observation, split: Split, t: Array) -> Array:

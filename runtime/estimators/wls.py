@@ -20,11 +20,11 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
 from runtime.errors import SettingsError
-from runtime.estimators.linear import OPTIONS, System, checked_options, raw_factor, whitened
+from runtime.estimators.estimate import Status
+from runtime.estimators.linear import OPTIONS, System, checked_options, raw_factor
 from runtime.estimators.solution import joint_scatter, solve
-from runtime.observation.observation import Observation
 from runtime.observation.qr_factor import Factor, factor
-from runtime.observation.reduction import Reduction
+from runtime.observation.system import Observation, whitened
 from runtime.settings.study import EstimateSettings
 
 CONVERGED = 1e-3
@@ -35,22 +35,18 @@ PASSES = 50
 """Largest number of passes of iterated weights; option `passes`."""
 
 
-def system(observation: Observation | Reduction, settings: EstimateSettings) -> System:
+def system(observation: Observation, settings: EstimateSettings) -> System:
     """The rows weighted as `settings.weights` asks; "none" means "joint", as the method has been named."""
     checked_options(settings, (*OPTIONS, "passes"))
     raw = raw_factor(observation, settings)
     if settings.weights == "covariance":
-        if isinstance(observation, Reduction):
-            message = (
-                "covariance needs the rows of an instant together, and this record is read by blocks. Use weights: joint, or stream: off"
-            )
-            raise SettingsError(message, path=("estimate", "weights"))
+        observation.require_rows("weights: covariance")
         return _covariance(observation, settings, raw)
     start = _by_joint(observation, settings, raw)
     return _iterated(start) if settings.weights == "iterated" else start
 
 
-def _by_joint(observation: Observation | Reduction, settings: EstimateSettings, raw: Factor) -> System:
+def _by_joint(observation: Observation, settings: EstimateSettings, raw: Factor) -> System:
     scales = _first_scales(raw, settings.options.get("rank_tolerance"))
     weighted = raw.weighted(1 / scales)
     return System(observation, settings, raw, weighted, tuple(scales.tolist()), known_variance=True, options=settings.options)
@@ -86,7 +82,8 @@ def _iterated(start: System) -> System:
         new = floored(raw, _common_scales(raw, solve(raw.weighted(1 / scales), tolerance).X, tolerance))
         change = float(np.max(np.abs(new / scales - 1)))
         scales, done = new, done + 1
-    status, message = "ok", ""
+    status: Status = "ok"
+    message = ""
     if change >= CONVERGED:
         status = "not-converged"
         message = (

@@ -1,6 +1,6 @@
-"""Exciting trajectories: what is asked of them, and how good a motion is (chapter, section 2.2.3).
+"""How well a motion lets the parameters be identified, and the limits that it must keep (chapter, section 2.2.3).
 
-The observation matrix is judged as an estimator uses it: rows of joint j divided by the deviation s_j of its torque, columns multiplied by the
+The criterion is that of the observation matrix as an estimator uses it: rows of joint j divided by the deviation s_j of its torque, columns multiplied by the
 size of their parameter, so that parameters are compared by their relative error.
 
     W_w = diag(1/s_j) W diag(|X_i|)       cond      s_max/s_min of W_w
@@ -24,6 +24,7 @@ import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.model.generated import GeneratedModel, require
+from runtime.motion.dry_friction import dry_friction
 from runtime.observation.filters import decimation_factor
 from runtime.observation.noise_gain import bandwidth
 from runtime.observation.observation import Observation, observe
@@ -38,8 +39,18 @@ SMALLEST = 0.01  # of the largest parameter of the same unit: what a smaller one
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
-    """Lower and upper q, largest |qd|, |qdd|, |tau| (inf: unlimited), shape (n,) each; SI."""
+class MotionLimits:
+    """Limits of a motion, shape (n,) each.
+
+    Attributes
+    ----------
+    lower, upper : ndarray, rad or m
+        Of the position.
+    qd, qdd : ndarray, rad/s or m/s, rad/s^2 or m/s^2
+        Largest velocity and acceleration.
+    tau : ndarray, N m or N
+        Largest torque; inf: unlimited.
+    """
 
     lower: Array
     upper: Array
@@ -47,41 +58,51 @@ class Limits:
     qdd: Array
     tau: Array
 
-    def of(self, share: float) -> Limits:
+    def of(self, share: float) -> MotionLimits:
         """The limits with `share` of each kept free; of a range, of its half width."""
         middle, half = (self.lower + self.upper) / 2, (1 - share) * (self.upper - self.lower) / 2
-        return Limits(middle - half, middle + half, *((1 - share) * x for x in (self.qd, self.qdd, self.tau)))
+        return MotionLimits(middle - half, middle + half, *((1 - share) * x for x in (self.qd, self.qdd, self.tau)))
 
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """How W is judged: columns `names`, deviation s_j of each joint, shape (n,), and size of each parameter, shape (c,)."""
+    """Scales of the rows and columns of W_w.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Columns, c of them.
+    s : ndarray, shape (n,), N m or N
+        Deviation of each torque.
+    size : ndarray, shape (c,), SI
+        Of each parameter.
+    """
 
     names: tuple[str, ...]
     s: Array
     size: Array
 
-    def matrix(self, seen: Observation) -> Array:
+    def matrix(self, observation: Observation) -> Array:
         """W_w, shape (r, c)."""
-        return np.asarray(seen.columns(self.names).W / self.s[seen.joints][:, None] * self.size)
+        return np.asarray(observation.columns(self.names).W / self.s[observation.joints][:, None] * self.size)
 
-    def condition(self, seen: Observation) -> float:
+    def condition(self, observation: Observation) -> float:
         """Condition number of W_w; inf where it is singular."""
-        values = np.linalg.svd(np.linalg.qr(self.matrix(seen), mode="r"), compute_uv=False)
+        values = np.linalg.svd(np.linalg.qr(self.matrix(observation), mode="r"), compute_uv=False)
         return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
 
-    def relative_sigma(self, seen: Observation, correlation: Sequence[float] | Array = (1.0,)) -> Array:
+    def relative_sigma(self, observation: Observation, correlation: Sequence[float] | Array = (1.0,)) -> Array:
         """Predicted %sigma of the parameters, shape (c,), of their size.
 
         correlation : of the torque noise of a joint between rows 0, 1, 2 ... sampling periods apart (`kept_correlation`).
         """
-        W = self.matrix(seen)
+        W = self.matrix(observation)
         inverse = np.linalg.inv(np.linalg.qr(W, mode="r"))
         spread = np.zeros((W.shape[1], W.shape[1]))  # W' Omega W
-        for j in range(seen.n):
-            at = np.rint((seen.t[seen.joint(j)] - seen.t.min()) * seen.rate).astype(int)
+        for j in range(observation.n):
+            at = np.rint((observation.t[observation.joint(j)] - observation.t.min()) * observation.rate).astype(int)
             rows = np.zeros((at.max(initial=0) + 1, W.shape[1]))
-            rows[at] = W[seen.joint(j)]
+            rows[at] = W[observation.joint(j)]
             spread += correlation[0] * rows.T @ rows
             for k, r in enumerate(correlation[1:], start=1):
                 shifted = rows[:-k].T @ rows[k:]
@@ -92,7 +113,18 @@ class Weights:
 
 @dataclass(frozen=True)
 class Excess:
-    """A limit that a motion passes: what, joint (from 1), largest value, limit, when."""
+    """A limit that a motion exceeds.
+
+    Attributes
+    ----------
+    what : str
+        Quantity.
+    joint : int
+        From 1.
+    value, limit : float, SI
+        Largest value, and its limit.
+    time : float, s
+    """
 
     what: str
     joint: int
@@ -104,7 +136,7 @@ class Excess:
         return f"{self.what} of joint {self.joint} is {self.value:.4g} at {self.time:.3f} s, limit {self.limit:.4g}"
 
 
-def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> Limits:
+def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
     """The limits of the robot file, changed by `given`; raises SettingsError where q, qd or qdd has none."""
     n = len(model.JOINTS)
     known = {**dict(getattr(model, "LIMITS", None) or {}), **given}
@@ -114,16 +146,16 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> Limits:
     unknown = known.keys() - {"q", "qd", "qdd", "tau"}
     if unknown:
         raise SettingsError(f"no limit {', '.join(sorted(unknown))}; there are q, qd, qdd, tau", path=("limits",))
-    found = {}
+    largest = {}
     for name in ("qd", "qdd", "tau"):
-        found[name] = np.array(np.broadcast_to(np.asarray(known.get(name, np.inf), dtype=float), (n,)))
-        if not np.all(found[name] > 0):
-            raise SettingsError(f"{name}: {found[name].tolist()}; expected more than 0", path=("limits", name))
+        largest[name] = np.array(np.broadcast_to(np.asarray(known.get(name, np.inf), dtype=float), (n,)))
+        if not np.all(largest[name] > 0):
+            raise SettingsError(f"{name}: {largest[name].tolist()}; expected more than 0", path=("limits", name))
     ranges = [(-float(x), float(x)) if np.ndim(x) == 0 else tuple(map(float, x)) for x in known["q"]]
     if len(ranges) != n or any(len(x) != 2 or not x[0] < x[1] for x in ranges):
         raise SettingsError(f"{known['q']}; expected {n} numbers or pairs (lower, upper)", path=("limits", "q"))
     lower, upper = np.array(ranges).T
-    return Limits(lower, upper, found["qd"], found["qdd"], found["tau"])
+    return MotionLimits(lower, upper, **largest)
 
 
 def weights_of(
@@ -152,13 +184,13 @@ def weights_of(
     return Weights(names, deviation, np.array([max(abs(X[name]), SMALLEST * largest[units.get(name, "")]) for name in names]))
 
 
-def criterion_of(weights: Weights, seen: Observation, criterion: str) -> float:
+def criterion_of(weights: Weights, observation: Observation, criterion: str) -> float:
     """The criterion on the rows of the identification, exact; smaller is better."""
     if criterion == "cond":
-        return weights.condition(seen)
+        return weights.condition(observation)
     if criterion == "sigma":  # white residuals: the order of candidates does not depend on it
-        return float(weights.relative_sigma(seen).max())
-    return float(-2 * np.sum(np.log(np.abs(np.diag(np.linalg.qr(weights.matrix(seen), mode="r"))))))
+        return float(weights.relative_sigma(observation).max())
+    return float(-2 * np.sum(np.log(np.abs(np.diag(np.linalg.qr(weights.matrix(observation), mode="r"))))))
 
 
 def kept_correlation(signals: Signals, rate: float) -> Array:
@@ -168,43 +200,48 @@ def kept_correlation(signals: Signals, rate: float) -> Array:
     return np.asarray(kept[: 1 + np.max(np.flatnonzero(np.abs(kept) > 1e-3 * kept[0]))] / kept[0])
 
 
-def observed(model: GeneratedModel, motion: Motion, study: Study, rate: float) -> Observation:
-    """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The rows' time window is not that of a record."""
+def planned(model: GeneratedModel, motion: Motion, study: Study, rate: float) -> Observation:
+    """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The time window of the rows is left out."""
     t, q, *_ = motion.sampled(rate)
     record = Record(t=t, q=q, tau=np.zeros_like(q), rate=rate, name="planned motion")
     return observe(model, record, replace(study, rows=replace(study.rows, window=(None, None))))
 
 
 def excesses(
-    model: GeneratedModel, motion: Motion, limits: Limits, settings: ExcitationSettings, X: Array, rate: float | None = None
+    model: GeneratedModel, motion: Motion, limits: MotionLimits, settings: ExcitationSettings, X: Array, rate: float | None = None
 ) -> list[Excess]:
-    """Limits that the motion passes on the grid of the controller: the worst instant of each joint and quantity. Distances are not among them."""
+    """Limits that the motion exceeds on the grid of the controller: the worst instant of each joint and quantity. Distances are not among them.
+
+    The rate of the torque is that without dry friction, whose jump at a reversal no motion avoids.
+    """
     require(model, "inverse_dynamics")
     functions: Any = model
     t, q, qd, qdd = motion.sampled(settings.rate if rate is None else rate)
     tau = functions.inverse_dynamics(q, qd, qdd, X)
-    change = np.abs(np.gradient(tau, t, axis=0))
-    n, inf = q.shape[1], np.inf
-    found = []
+    free = np.full(q.shape[1], np.inf)
     bounds = [
         ("position", q, limits.lower, limits.upper),
         ("velocity", qd, -limits.qd, limits.qd),
         ("acceleration", qdd, -limits.qdd, limits.qdd),
         ("torque", tau, -limits.tau, limits.tau),
-        ("rate of torque", change, np.full(n, -inf), np.array(settings.torque_rate or [inf] * n)),
-        ("rms torque", np.sqrt(np.mean(tau**2, axis=0))[None], np.full(n, -inf), np.array(settings.torque_rms or [inf] * n)),
     ]
+    if settings.torque_rate:
+        smooth = functions.inverse_dynamics(q, qd, qdd, X * dry_friction(model).smooth)
+        bounds.append(("rate of torque", np.abs(np.gradient(smooth, t, axis=0)), -free, np.array(settings.torque_rate)))
+    if settings.torque_rms:
+        bounds.append(("rms torque", np.sqrt(np.mean(tau**2, axis=0))[None], -free, np.array(settings.torque_rms)))
+    exceeded = []
     for what, x, lower, upper in bounds:
         beyond = np.maximum(x - upper, lower - x)
-        for j in range(n):
+        for j in range(q.shape[1]):
             k = int(np.argmax(beyond[:, j]))
             if beyond[k, j] > 1e-9 * max(1.0, abs(x[k, j])):
                 limit = upper[j] if x[k, j] > upper[j] else lower[j]
-                found.append(Excess(what, j + 1, float(x[k, j]), float(limit), float(t[k])))
-    return found
+                exceeded.append(Excess(what, j + 1, float(x[k, j]), float(limit), float(t[k])))
+    return exceeded
 
 
-def usage(model: GeneratedModel, motion: Motion, limits: Limits, rate: float, X: Array) -> dict[str, list[float]]:
+def usage(model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array) -> dict[str, list[float]]:
     """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint; of a range, measured from its middle."""
     functions: Any = model
     _, q, qd, qdd = motion.sampled(rate)

@@ -1,96 +1,226 @@
-"""The search for exciting motions: casadi's functions, IPOPT from several random starts.
+"""Exciting motions: the search from several random starts, and what its best motion promises.
 
-From each start, first -log det(W_w'W_w) is lowered, which is smooth and does not depend on the scale of a column, then the criterion itself.
-Condition numbers and largest deviations are followed by the smooth bounds
+    excitation = excite(model, record, study)         # section `excitation` of the study
+    excitation.verdict, excitation.relative_sigma     # predicted %sigma of every parameter
+    t, q, qd, qdd, tau = excitation.sampled()
 
-    cond^2 <= (tr A^8 tr C^8)^(1/8),     max_i C_ii <= (sum_i C_ii^8)^(1/8),     A = W_w'W_w, C = A^-1.
-
-Limits hold at the points of the grid with a margin, which is widened until they hold at the controller rate. sign(qd) is tanh(qd/v0) here and
-sign(qd) again in every figure that is reported.
+The margin at the points of the optimiser's grid (`runtime.excitation.optimiser`) is widened until the limits hold at the controller rate. Every
+figure of the result is that of the rows the identification will use, with sign(qd) itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.excitation.criteria import Array, Limits, Weights, criterion_of, excesses, kept_correlation, observed
-from runtime.model.casadi import SymbolicModel, load_symbolic
-from runtime.model.generated import GeneratedModel
+from runtime.estimators.essential import essential_of
+from runtime.estimators.methods import estimate_of
+from runtime.excitation.criteria import (
+    MotionLimits,
+    Weights,
+    criterion_of,
+    excesses,
+    kept_correlation,
+    limits_of,
+    planned,
+    usage,
+    weights_of,
+)
+from runtime.excitation.optimiser import Problem, Start, improved, one_start
+from runtime.model.casadi import casadi_path
+from runtime.model.generated import GeneratedModel, require
+from runtime.motion.dry_friction import dry_friction
+from runtime.motion.simulation import parameters_of
+from runtime.observation.observation import observe
 from runtime.parallel import results
+from runtime.records.record import Record
 from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.study import Study
-from runtime.settings.families import Fourier
-from runtime.settings.trajectories import Motion, Part, motion_from_mapping
+from runtime.settings.study import Study, to_mapping
+from runtime.settings.trajectories import Motion, motion_from_mapping
+from runtime.table import Table
 
-SOFT = 1e-6  # violation of a constraint that IPOPT aims at, of its scale
+Array = np.ndarray
+
 TOLERATED = 1e-3  # violation at the points of the grid of a start that is looked at
 BEST = 3  # starts that are looked at on the grid of the controller
 WIDENINGS = 2  # of the margin, doubled each time
+LISTED = 10  # parameters of the table, the least certain ones
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """What every start needs; travels once to each process. X: all base parameters, shape (b,)."""
+class Known:
+    """Parameters that the search stands on, and how good the motion of the records was.
 
-    path: str
-    settings: ExcitationSettings
-    weights: Weights
-    limits: Limits
+    Attributes
+    ----------
+    X : ndarray, shape (b,)
+        All base parameters.
+    source : str
+        Where they come from.
+    weights : Weights
+    condition : float or None
+        Of W_w of the records; None without records.
+    relative_sigma : dict
+        Predicted %sigma by name on the motion of the records; empty without records.
+    """
+
     X: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Start:
-    """What one start gave: the motion as a mapping, the criterion of the optimiser, its last word, the largest violation on its grid."""
-
-    number: int
-    motion: dict[str, Any]
-    criterion: float
-    message: str
-    violation: float
+    source: str
+    weights: Weights
+    condition: float | None = None
+    relative_sigma: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """The best motion found.
+    """The best motion of a search.
 
-    condition : of W_w on the rows of the identification.   relative_sigma : predicted %sigma by name.
-    starts : every start.   margin : share of the limits kept free at the points of the grid, as it had to be.
+    Attributes
+    ----------
+    model : GeneratedModel
+    motion : Motion
+    condition : float
+        Of W_w on the rows of the identification.
+    relative_sigma : dict
+        Predicted %sigma by name.
+    starts : tuple of Start
+        All of them, by number.
+    margin : float
+        Share of the limits kept free at the points of the grid, as it had to be.
+    settings : ExcitationSettings
+    limits : MotionLimits
+    known : Known
+        Parameters that the search stands on.
     """
 
+    model: GeneratedModel
     motion: Motion
     condition: float
     relative_sigma: dict[str, float]
     starts: tuple[Start, ...]
     margin: float
+    settings: ExcitationSettings
+    limits: MotionLimits
+    known: Known
+
+    def sampled(self) -> tuple[Array, Array, Array, Array, Array]:
+        """t, shape (N,), and q, qd, qdd, tau, shape (N, n), at the controller rate."""
+        functions: Any = self.model
+        t, q, qd, qdd = self.motion.sampled(self.settings.rate)
+        return t, q, qd, qdd, functions.inverse_dynamics(q, qd, qdd, self.known.X)
+
+    def to_csv(self) -> str:
+        """t, q1 ..., qd1 ..., qdd1 ... at the controller rate, SI: a reference that `simulate` reads."""
+        t, q, qd, qdd, _ = self.sampled()
+        header = ",".join(["t", *(f"{x}{j + 1}" for x in ("q", "qd", "qdd") for j in range(q.shape[1]))])
+        rows = "\n".join(",".join(f"{x:.10g}" for x in row) for row in np.column_stack([t, q, qd, qdd]))
+        return f"{header}\n{rows}\n"
+
+    @property
+    def usage(self) -> dict[str, list[float]]:
+        """Largest share of each limit that the motion uses, by quantity and joint."""
+        return usage(self.model, self.motion, self.limits, self.settings.rate, self.known.X)
+
+    @property
+    def verdict(self) -> str:
+        """Condition and the least certain parameter, in one sentence."""
+        of_record = "" if self.known.condition is None else f" (motion of the record: {self.known.condition:.1f})"
+        worst = max(self.relative_sigma, key=self.relative_sigma.__getitem__)
+        return (
+            f"A motion of {self.motion.duration:.1f} s within all limits with weighted cond(W) {self.condition:.1f}{of_record}; "
+            f"least certain is {worst} with a predicted %sigma of {self.relative_sigma[worst]:.2g}."
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as JSON values: excitation.json."""
+        return {
+            "robot": self.model.NAME,
+            "parameters_from": self.known.source,
+            "duration": self.motion.duration,
+            "cond": self.condition,
+            "cond_of_record": self.known.condition,
+            "relative_sigma": self.relative_sigma,
+            "relative_sigma_of_record": self.known.relative_sigma,
+            "torque_sigma": self.known.weights.s.tolist(),
+            "limits_used": self.usage,
+            "margin": self.margin,
+            "starts": [{"number": s.number, "criterion": s.criterion, "violation": s.violation, "message": s.message} for s in self.starts],
+            "settings": to_mapping(self.settings),
+        }
+
+    def sigma_table(self, most: int | None = None) -> Table:
+        """Predicted %sigma, the least certain parameters first, beside that of the motion of the record; the first `most` of them."""
+        before = self.known.relative_sigma
+        worst = sorted(self.relative_sigma.items(), key=lambda item: -item[1])[:most]
+        rows = [(name, f"{value:.3g}", *((f"{before[name]:.3g}",) if before else ())) for name, value in worst]
+        note = f"Parameters and torque deviations: {self.known.source}. Torque noise is taken as white at the sampling rate; model error is not."
+        return Table("Predicted %sigma", ("parameter", "this motion", *(("motion of the record",) if before else ())), rows, note)
+
+    def usage_table(self) -> Table:
+        """Share of the limits used, by quantity and joint."""
+        rows = [(what, *(f"{100 * x:.1f}" for x in shares)) for what, shares in self.usage.items()]
+        note = "At the controller rate. 100 is the limit; the optimiser keeps a margin."
+        return Table("Share of the limits used, %", ("", *(f"joint {j}" for j in self.model.JOINTS)), rows, note)
+
+    def starts_table(self) -> Table:
+        """How every start ended."""
+        rows = [(str(s.number), f"{s.criterion:.4g}", f"{s.violation:.1e}", s.message) for s in self.starts]
+        return Table("Starts", ("start", "criterion", "violation", "end"), rows)
+
+    def to_table(self) -> str:
+        """Verdict, the least certain parameters, how far the limits are used."""
+        return "\n\n".join(
+            [self.verdict, *(f"{table.caption}\n{table.to_text()}" for table in (self.sigma_table(LISTED), self.usage_table()))]
+        )
+
+    def __str__(self) -> str:
+        return self.to_table()
 
 
 def excite(
     model: GeneratedModel,
-    symbolic_path: str,
-    study: Study,
-    settings: ExcitationSettings,
-    weights: Weights,
-    limits: Limits,
-    X: Array,
+    records: Record | Sequence[Record] = (),
+    study: Study | None = None,
     *,
+    symbolic: str | Path | ModuleType | None = None,
     workers: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """The motion of smallest criterion over all starts, within the limits at the controller rate.
+    """The motion of smallest criterion over all starts of study.excitation, within the limits at the controller rate.
 
-    symbolic_path : the casadi module of the same robot.   X : base parameters for torques, shape (b,).
-    workers : processes, 0 for this one; results do not depend on it.   progress : called after each start with the number done and their total.
-    Raises InputError where no start keeps the limits, with the limit that was missed most.
+    Parameters
+    ----------
+    model : GeneratedModel
+    records : Record or sequence of Record
+        Their estimate gives parameters and deviations of the torques; without records, the values of the robot file serve.
+    study : Study, optional
+        Families, limits, criterion, filters and rows; default: Study().
+    symbolic : str, Path or module, optional
+        CasADi model of the same robot; default: the file beside that of `model`.
+    workers : int
+        Processes, 0 for this one; results do not depend on it.
+    progress : callable, optional
+        Called after each start with the number done and their total.
+
+    Raises
+    ------
+    InputError
+        No start keeps the limits, with the limit that was missed most; or the parameters are known neither from a record nor from the robot file.
     """
-    starts: list[Start] = []
-    problem = Problem(symbolic_path, settings, weights, limits, X)
+    study = study or Study()
+    settings = study.excitation or ExcitationSettings()
+    known = _known(model, (records,) if isinstance(records, Record) else tuple(records), study, settings)
+    limits, weights = limits_of(model, settings.limits), known.weights
+    require(model, "inverse_dynamics")
+    path = str(getattr(symbolic, "__file__", symbolic) or casadi_path(model))
+    problem = Problem(path, settings, weights, limits, known.X, dry_friction(model).smooth)
+    starts = []
     for start in results(one_start, problem, range(settings.starts), workers):
         starts.append(start)
         if progress is not None:
@@ -103,236 +233,53 @@ def excite(
             f"no motion within the limits in {settings.starts} starts; the closest misses a limit by {least.violation:.2g} of it "
             f"({least.message}). Widen the limits, lengthen the parts, ask for fewer harmonics or points, or free `begin`"
         )
-    within = [found for found in (_within(model, problem, start) for start in kept[:BEST]) if isinstance(found, tuple)]
-    if not within:
-        passed = excesses(model, motion_from_mapping(kept[0].motion), limits, settings, X)
-        listed = "; ".join(map(str, passed[:3]))
+    candidates = []
+    for motion, margin in _within(model, problem, kept[:BEST]):
+        observation = planned(model, motion, study, settings.rate)
+        candidates.append((criterion_of(weights, observation, settings.criterion), motion, margin, observation))
+    if not candidates:
+        exceeded = excesses(model, motion_from_mapping(kept[0].motion), limits, settings, known.X)
         raise InputError(
-            f"between the points of the grid {listed}, also with twice and four times the margin; raise `grid` ({settings.grid:g} Hz)"
+            f"between the points of the grid {'; '.join(map(str, exceeded[:3]))}, also with twice and four times the margin; "
+            f"raise `grid` ({settings.grid:g} Hz)"
         )
-    judged = [
-        (criterion_of(weights, observed(model, motion, study, settings.rate), settings.criterion), motion, margin)
-        for motion, margin in within
-    ]
-    _, motion, margin = min(judged, key=lambda found: found[0])
-    seen = observed(model, motion, study, settings.rate)
-    sigma = dict(zip(weights.names, map(float, weights.relative_sigma(seen, kept_correlation(study.signals, settings.rate))), strict=True))
-    return Excitation(motion, weights.condition(seen), sigma, tuple(starts), margin)
+    _, motion, margin, observation = min(candidates, key=lambda candidate: candidate[0])
+    sigma = _relative_sigma(weights, observation, study, settings.rate)
+    return Excitation(model, motion, weights.condition(observation), sigma, tuple(starts), margin, settings, limits, known)
 
 
-def _within(model: GeneratedModel, problem: Problem, start: Start) -> tuple[Motion, float] | None:
-    """The motion of a start within the limits at the controller rate, with the margin that took; None where wider ones do not help."""
-    settings = problem.settings
-    for _ in range(WIDENINGS + 1):
-        motion = motion_from_mapping(start.motion)
-        if start.violation <= TOLERATED and not excesses(model, motion, problem.limits, settings, problem.X):
-            return motion, settings.margin
-        settings = replace(settings, margin=max(2 * settings.margin, 0.01))
-        start = _search(replace(problem, settings=settings), start.number, motion)
-    return None
+def _within(model: GeneratedModel, problem: Problem, starts: Sequence[Start]) -> Iterator[tuple[Motion, float]]:
+    """Motions of the starts within the limits at the controller rate, with the margin that took; none of a start where wider ones do not help."""
+    for start in starts:
+        settings = problem.settings
+        for _ in range(WIDENINGS + 1):
+            motion = motion_from_mapping(start.motion)
+            if start.violation <= TOLERATED and not excesses(model, motion, problem.limits, settings, problem.X):
+                yield motion, settings.margin
+                break
+            settings = replace(settings, margin=max(2 * settings.margin, 0.01))
+            start = improved(replace(problem, settings=settings), start.number, motion)
 
 
-def one_start(problem: Problem, number: int) -> Start:
-    """Both stages from the random start `number`."""
-    rng = np.random.default_rng([problem.settings.seed, number])
-    guess = Motion(tuple(Part(family, _guess(problem, family, rng)) for family in problem.settings.families))
-    return _search(problem, number, guess)
+def _known(model: GeneratedModel, records: Sequence[Record], study: Study, settings: ExcitationSettings) -> Known:
+    """From records: estimate, deviations, essential parameters, condition and %sigma. Without: the values of the robot file."""
+    if not records:
+        X = parameters_of(model)
+        return Known(X, "values of the robot file", weights_of(model, settings, dict(zip(model.BASE_PARAMETERS, X, strict=True))))
+    observation = observe(model, records, study)
+    linear = replace(study.estimate, method="ols", weights="none", options={}, columns="all")
+    fit = estimate_of(observation, linear, model=model)
+    if fit.status == "rank-deficient":
+        raise InputError(
+            f"the record does not determine {', '.join(' '.join(group) for group in fit.groups)}; leave it out, or name columns"
+        )
+    names = essential_of(observation, study.essential, linear).names
+    deviations = [joint.sigma_rho for joint in fit.per_joint]
+    weights = weights_of(model, settings, dict(zip(fit.names, fit.X, strict=True)), essential=names, s=deviations)
+    sigma = _relative_sigma(weights, observation, study, records[0].rate)
+    return Known(fit.X, f"estimate of {', '.join(record.name for record in records)}", weights, weights.condition(observation), sigma)
 
 
-def _search(problem: Problem, number: int, guess: Motion) -> Start:
-    """The motion that IPOPT reaches from `guess`."""
-    settings, n = problem.settings, len(problem.weights.s)
-    symbolic = load_symbolic(problem.path)
-    p = [ca.MX.sym(f"p{k}", len(family.names), n) for k, family in enumerate(settings.families)]
-    q, qd, qdd = _states(settings, p)
-    A = _information(symbolic, settings, problem.weights, q, qd, qdd)
-    g, lower, upper = _constraints(symbolic, problem, p, q, qd, qdd)
-    least, most = (np.concatenate([np.tile(family.bounds()[k], n) for family in settings.families]) for k in (0, 1))
-    nlp = {"x": ca.vertcat(*(ca.vec(part) for part in p)), "g": g}
-    x = np.concatenate([part.p.ravel(order="F") for part in guess.parts])
-    found = _minimised({**nlp, "f": _logdet(A)}, x, (least, most), (lower, upper), settings.iterations)
-    if settings.criterion != "logdet":
-        found = _minimised({**nlp, "f": _spread(A, settings.criterion)}, found[0], (least, most), (lower, upper), settings.iterations)
-    x, criterion, violation, message = found
-    sizes = np.cumsum([part.p.size for part in guess.parts])[:-1]
-    parts = [
-        Part(part.family, values.reshape(part.p.shape, order="F")) for part, values in zip(guess.parts, np.split(x, sizes), strict=True)
-    ]
-    return Start(number, Motion(tuple(parts)).to_mapping(), criterion, message, violation)
-
-
-def _states(settings: ExcitationSettings, p: Sequence[Any]) -> tuple[Any, Any, Any]:
-    """q, qd, qdd at the points of the grid, part after part, shape (M, n)."""
-    parts = []
-    for family, coefficients in zip(settings.families, p, strict=True):
-        t = np.linspace(0.0, family.duration, max(3, round(family.duration * settings.grid) + 1))
-        joints = [family.joint(t, column, ca) for column in ca.horzsplit(coefficients)]
-        parts.append([ca.horzcat(*(joint[k] for joint in joints)) for k in range(3)])
-    q, qd, qdd = (ca.vertcat(*(part[k] for part in parts)) for k in range(3))
-    return q, qd, qdd
-
-
-def _information(symbolic: SymbolicModel, settings: ExcitationSettings, weights: Weights, q: Any, qd: Any, qdd: Any) -> Any:
-    """A = sum_j W_wj'W_wj over the grid, shape (c, c)."""
-    n, M = len(weights.s), q.shape[0]
-    inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
-    D = smoothed(symbolic.regressor, settings.smooth)(*inputs, *symbolic.CONSTANTS.values())
-    numbers = [list(symbolic.BASE_PARAMETERS).index(name) for name in weights.names]
-    weighted = ca.mtimes(ca.mtimes(ca.diag(1 / weights.s), D[:, numbers]), ca.diag(weights.size))
-    rows = [ca.Function("row", inputs, [weighted[j, :].T]).map(M)(q.T, qd.T, qdd.T) for j in range(n)]
-    return sum(ca.mtimes(row, row.T) for row in rows) / M
-
-
-def _logdet(A: Any) -> Any:
-    """-log det A by an expression of its Cholesky factor."""
-    S = ca.SX.sym("A", A.shape[0], A.shape[0])
-    R = ca.chol(S)
-    return ca.Function("logdet", [S], [-2 * ca.sum1(ca.log(ca.diag(R)))])(A)
-
-
-def _spread(A: Any, criterion: str) -> Any:
-    """Logarithm of the smooth bound of the criterion."""
-    C = ca.solve(A, ca.DM.eye(A.shape[0]), "qr")
-    if criterion == "sigma":
-        return ca.log(ca.sum1(ca.diag(C) ** 8)) / 8
-    A4, C4 = (ca.mtimes(x, x) for x in (ca.mtimes(A, A), ca.mtimes(C, C)))
-    return (ca.log(ca.sumsqr(A4)) + ca.log(ca.sumsqr(C4))) / 8
-
-
-def _constraints(symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q: Any, qd: Any, qdd: Any) -> tuple[Any, Array, Array]:
-    """g(p) with its bounds, each divided by its scale."""
-    settings, limits = problem.settings, problem.limits.of(problem.settings.margin)
-    M = q.shape[0]
-    rows: list[tuple[Any, Any, Any]] = []  # expression, lower, upper: (M, n) or (n,)
-    half = (limits.upper - limits.lower) / 2
-    rows.append(((q - _rows(limits.lower + half, M)) / _rows(half, M), -1.0, 1.0))
-    rows.append((qd / _rows(limits.qd, M), -1.0, 1.0))
-    rows.append((qdd / _rows(limits.qdd, M), -1.0, 1.0))
-    rows += _torques(symbolic, problem, limits, q, qd, qdd)
-    rows += _distances(symbolic, settings, q)
-    ends = []
-    for k, (family, coefficients) in enumerate(zip(settings.families, p, strict=True)):
-        begin, end = (_at(family, coefficients, t) for t in (0.0, family.duration))
-        if isinstance(family, Fourier):
-            rows += [(begin[1] / limits.qd, 0.0, 0.0), (begin[2] / limits.qdd, 0.0, 0.0)]
-        speed = getattr(family, "speed", None)
-        if speed is not None:
-            corners = [_at(family, coefficients, family.blend / 2 + family.travel * (i + 0.5))[1] for i in range(family.points - 1)]  # type: ignore[attr-defined]
-            rows += [(corner / speed, -1.0, 1.0) for corner in corners]
-        ends.append((begin[0], end[0]))
-        if k:
-            rows.append(((begin[0] - ends[k - 1][1]) / half, 0.0, 0.0))
-        elif settings.begin is not None:
-            rows.append(((begin[0] - np.array(settings.begin)) / half, 0.0, 0.0))
-    g = [ca.vec(expression) for expression, *_ in rows]
-    lower, upper = (np.concatenate([np.full(part.numel(), bound[k]) for part, (_, *bound) in zip(g, rows, strict=True)]) for k in (0, 1))
-    return ca.vertcat(*g), lower, upper
-
-
-def _torques(symbolic: SymbolicModel, problem: Problem, limits: Limits, q: Any, qd: Any, qdd: Any) -> list[tuple[Any, float, float]]:
-    """Torques, their root mean squares and rates of change, where they are limited."""
-    settings = problem.settings
-    limited = np.isfinite(limits.tau)
-    if not (limited.any() or settings.torque_rms or settings.torque_rate):
-        return []
-    n, M = q.shape[1], q.shape[0]
-    inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
-    smooth = smoothed(symbolic.inverse_dynamics, settings.smooth)
-    torque = ca.Function("torque", inputs, [smooth(*inputs, problem.X, *symbolic.CONSTANTS.values())])
-    tau = torque.map(M)(q.T, qd.T, qdd.T).T
-    found: list[tuple[Any, float, float]] = [(tau[:, j] / limits.tau[j], -1.0, 1.0) for j in np.flatnonzero(limited).tolist()]
-    share = 1 - settings.margin
-    if settings.torque_rms:
-        found.append((ca.sum1(tau**2).T / M / (share * np.array(settings.torque_rms)) ** 2, 0.0, 1.0))
-    if settings.torque_rate:
-        found.append(((tau[1:, :] - tau[:-1, :]) * settings.grid / _rows(share * np.array(settings.torque_rate), M - 1), -1.0, 1.0))
-    return found
-
-
-def _distances(symbolic: SymbolicModel, settings: ExcitationSettings, q: Any) -> list[tuple[Any, float, float]]:
-    """Squared distances of the spheres that stay apart, of the square of the smallest they may have."""
-    if not settings.pairs:
-        return []
-    n, M = q.shape[1], q.shape[0]
-    at = ca.SX.sym("q", n)
-    frame_poses: Any = getattr(symbolic, "frame_poses", None)
-    if frame_poses is None:
-        raise InputError("this casadi module has no frame_poses, which distances need; emit it again")
-    poses = dict(zip(frame_poses.name_out(), frame_poses(at, *symbolic.CONSTANTS.values()), strict=True))
-    unknown = [sphere.frame for sphere in settings.spheres if f"T{sphere.frame}" not in poses and sphere.frame != 0]
-    if unknown:
-        raise InputError(f"no frame {unknown[0]} that could carry a sphere; there are 0, {', '.join(name[1:] for name in poses)}")
-    poses["T0"] = ca.SX.eye(4)
-    centres = [ca.mtimes(poses[f"T{s.frame}"], ca.vertcat(*s.centre, 1.0))[:3] for s in settings.spheres]
-    smallest = [settings.spheres[a].radius + settings.spheres[b].radius + settings.gap for a, b in settings.pairs]
-    squares = [ca.sumsqr(centres[a] - centres[b]) / d**2 for (a, b), d in zip(settings.pairs, smallest, strict=True)]
-    return [(ca.Function("apart", [at], [ca.vertcat(*squares)]).map(M)(q.T), 1.0 + 2 * settings.margin, np.inf)]
-
-
-def _minimised(
-    nlp: dict[str, Any], guess: Array, range_of_x: tuple[Array, Array], range_of_g: tuple[Array, Array], iterations: int
-) -> tuple[Array, float, float, str]:
-    """x, criterion, largest violation of a constraint, and what IPOPT says."""
-    options: dict[str, Any] = {
-        "ipopt": {
-            "hessian_approximation": "limited-memory",
-            "limited_memory_max_history": 8,
-            "max_iter": iterations,
-            "print_level": 0,
-            "sb": "yes",
-            "tol": 1e-4,
-            "constr_viol_tol": SOFT,
-            "acceptable_tol": 1e-3,
-            "mu_strategy": "adaptive",
-        },
-        "print_time": False,
-        "error_on_fail": False,
-    }
-    solver = ca.nlpsol("excite", "ipopt", nlp, options)
-    found = solver(x0=guess, lbx=range_of_x[0], ubx=range_of_x[1], lbg=range_of_g[0], ubg=range_of_g[1])
-    g = np.asarray(found["g"]).ravel()
-    violation = float(np.max(np.maximum(range_of_g[0] - g, g - range_of_g[1]), initial=0.0))
-    criterion = float(found["f"])
-    x = np.asarray(found["x"]).ravel()
-    if not (np.isfinite(criterion) and np.isfinite(violation)):
-        return guess, float("inf"), float("inf"), solver.stats()["return_status"]
-    return x, criterion, violation, solver.stats()["return_status"]
-
-
-def smoothed(function: Any, v0: float) -> Any:
-    """The ca.Function of scalars with tanh(u/v0) in place of every sign(u)."""
-    inputs = function.sx_in()
-    columns = [ca.vertsplit(x) if x.numel() else [] for x in inputs]
-    results = [[0.0] * function.nnz_out(k) for k in range(function.n_out())]
-    w: list[Any] = [None] * function.sz_w()
-    for k in range(function.n_instructions()):
-        op, i, o = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
-        if op == ca.OP_CONST:
-            w[o[0]] = ca.SX(function.instruction_constant(k))
-        elif op == ca.OP_INPUT:
-            w[o[0]] = columns[i[0]][i[1]]
-        elif op == ca.OP_OUTPUT:
-            results[o[0]][o[1]] = w[i[0]]
-        elif op == ca.OP_SIGN:
-            w[o[0]] = ca.tanh(w[i[0]] / v0)
-        else:
-            w[o[0]] = ca.SX.unary(op, w[i[0]]) if len(i) == 1 else ca.SX.binary(op, w[i[0]], w[i[1]])
-    found = [ca.SX(function.sparsity_out(k), ca.vertcat(*x)) for k, x in enumerate(results)]
-    return ca.Function(f"{function.name()}_smooth", inputs, found)
-
-
-def _at(family: Any, p: Any, t: float) -> list[Any]:
-    """q, qd, qdd of all joints at one time, shape (n, 1)."""
-    joints = [family.joint(np.array([t]), column, ca) for column in ca.horzsplit(p)]
-    return [ca.vertcat(*(joint[k] for joint in joints)) for k in range(3)]
-
-
-def _guess(problem: Problem, family: Any, rng: np.random.Generator) -> Array:
-    limits = problem.limits
-    speed = np.minimum(limits.qd, 1e3)
-    return np.array([family.guess(rng, lo, up, v) for lo, up, v in zip(limits.lower, limits.upper, speed, strict=True)]).T
-
-
-def _rows(x: Array, M: int) -> Any:
-    """x, shape (n,), in each of M rows."""
-    return ca.DM(np.tile(x, (M, 1)))
+def _relative_sigma(weights: Weights, observation: Any, study: Study, rate: float) -> dict[str, float]:
+    sigma = weights.relative_sigma(observation, kept_correlation(study.signals, rate))
+    return dict(zip(weights.names, map(float, sigma), strict=True))

@@ -1,4 +1,4 @@
-"""Can the values of an identification be used? One question after another, each with what was found, the limit, and what to do.
+"""Can the values of an identification be used? One question after another, each with its answer, the limit, and what to do.
 
     good       within the limit
     doubtful   usable with the care that the remedy names
@@ -6,23 +6,25 @@
     open       not asked, or only the user can tell: does not count
 
 The verdict is the worst of the answers. Limits are constants of this module: they are conventions of practice, not theorems. Errors are relative, in %:
-100 ||Y - W X|| / ||Y||; deviations are the larger of the corrected one and the one of blocks drawn again (`runtime.identification.uncertainty`), never eq. (10) alone.
+100 ||Y - W X|| / ||Y||; deviations are the larger of the corrected one and the one of the block bootstrap (`runtime.identification.uncertainty`), never
+eq. (10) alone.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from runtime.estimators import CLOSED_LOOP
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import CLOSED_LOOP
 from runtime.estimators.physical import CERTAIN
-from runtime.identification.identification import Identification, lost_joints
 from runtime.identification.validation import CORRELATION
 from runtime.resolution.advice import Advice, step_text
 from runtime.resolution.result import BIASED, NEGLIGIBLE, Level
+from runtime.table import Table, notebook
 
 if TYPE_CHECKING:
     from runtime.estimators.feasibility import Feasibility
@@ -37,26 +39,47 @@ TOTAL = (10.0, 20.0)
 """Relative error of all joints, %: good up to the first, unusable above the second."""
 JOINT = (25.0, 50.0)
 """Of the worst joint, %."""
-UNSEEN = ((1.5, 2.0), (3.0, 5.0))
+PREDICTION = ((1.5, 2.0), (3.0, 5.0))
 """Error on data that did not give the parameters: times the error of the fit, or % where that is larger; good, then usable."""
 DEVIATION = 30.0
 """Deviation of a parameter in % of its value."""
+LOST = 25.0
+"""Relative error of a joint in %, above which it is asked whether the removed parameters explained it."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One question. limit : what a good answer keeps to.   remedy : what to do otherwise."""
+    """One question.
+
+    Attributes
+    ----------
+    question : str
+    state : "good", "doubtful", "no" or "open"
+    finding : str
+        The answer, with its numbers.
+    limit : str
+        What a good answer keeps to.
+    remedy : str
+        What to do where the answer is not good.
+    """
 
     question: str
     state: State
-    found: str
+    finding: str
     limit: str = ""
     remedy: str = ""
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """The checks, and the verdict in three sentences: use, largest doubt, next step."""
+class Checklist:
+    """The verdict on an identification: whether its values can be used, the largest doubt, the next step.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    use : str
+        What the parameters explain, in one sentence.
+    """
 
     checks: tuple[Check, ...]
     use: str
@@ -69,8 +92,8 @@ class Judgement:
     @property
     def answer(self) -> str:
         """Yes, with care, or no; a yes says where something was not judged."""
-        open_ones = any(check.state == "open" for check in self.checks)
-        return ANSWERS[self.state] + (", as far as judged" if self.state == "good" and open_ones else "")
+        unanswered = any(check.state == "open" for check in self.checks)
+        return ANSWERS[self.state] + (", as far as judged" if self.state == "good" and unanswered else "")
 
     @property
     def worst(self) -> Check | None:
@@ -81,108 +104,155 @@ class Judgement:
     def doubt(self) -> str:
         """The largest doubt, in a sentence."""
         if self.worst is not None:
-            return f"{self.worst.question} {self.worst.found}."
-        left = [check.question.rstrip("?") for check in self.checks if check.state == "open"]
-        return "none among the checks below" + (f"; not judged: {'; '.join(left)}." if left else ".")
+            return f"{self.worst.question} {self.worst.finding}."
+        unanswered = [check.question.rstrip("?") for check in self.checks if check.state == "open"]
+        return "none among the checks below" + (f"; not judged: {'; '.join(unanswered)}." if unanswered else ".")
 
     @property
     def next(self) -> str:
         """What to do, in a sentence."""
-        asked = self.worst or next((check for check in self.checks if check.state == "open" and check.remedy), None)
-        return (asked.remedy if asked is not None else "use the essential parameters with their corrected deviations") + "."
+        check = self.worst or next((check for check in self.checks if check.state == "open" and check.remedy), None)
+        return (check.remedy if check is not None else "use the essential parameters with their corrected deviations") + "."
 
-    def text(self) -> str:
+    def __str__(self) -> str:
+        return self.to_text()
+
+    def _repr_html_(self) -> str:
+        rows = [(check.question, check.state, check.finding, check.remedy if check.state != "good" else "") for check in self.checks]
+        return notebook([f"{self.answer}. {self.use}"], Table("", ("question", "answer", "finding", "what to do"), rows, wide=(1, 2, 3)))
+
+    def to_text(self) -> str:
         """The verdict as plain text."""
         return f"{self.answer}. {self.use}\nBiggest doubt: {self.doubt}\nNext: {self.next}"
 
     def summary(self) -> dict[str, Any]:
         """For JSON."""
-        return {"state": self.state, "answer": self.answer, "use": self.use, "doubt": self.doubt, "next": self.next, "checks": self.checks}
+        checks = [{"question": c.question, "state": c.state, "found": c.finding, "limit": c.limit, "remedy": c.remedy} for c in self.checks]
+        return {"state": self.state, "answer": self.answer, "use": self.use, "doubt": self.doubt, "next": self.next, "checks": checks}
 
 
-def judge(found: Identification, *, feasibility: Feasibility | None = None, advice: Advice | None = None) -> Judgement:
-    """The judgement of an identification, with what was asked besides."""
-    checks = [determined(found)]
-    if found.every.status != "rank-deficient":
-        checks += [explained(found), *every_joint(found), predicted(found), signs(found), certain(found), apart(found.carried)]
-        checks += [physical(found.every, feasibility), resolved(advice)]
-    return Judgement(tuple(checks), found.verdict)
+def checklist_of(
+    estimate: Estimate,
+    fit: Estimate,
+    use: str,
+    *,
+    bootstrap: Mapping[str, float],
+    prediction_error: float,
+    negative: Sequence[str] = (),
+    feasibility: Feasibility | None = None,
+    advice: Advice | None = None,
+) -> Checklist:
+    """The checklist of an identification; rank alone where the record does not determine the parameters.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        All parameters.
+    fit : Estimate
+        The parameters that stand for the robot.
+    use : str
+        What they explain, in one sentence.
+    bootstrap : mapping of str to float
+        Deviations by name from blocks of time drawn again; parameters that it lacks have the corrected deviation.
+    prediction_error : float, %
+        Largest relative error of `fit` on data that did not give it; nan where there are none.
+    negative : sequence of str
+        Frictions and motor inertias certainly below zero.
+    feasibility : Feasibility, optional
+        Whether a physical robot can have the parameters.
+    advice : Advice, optional
+        The coarsest encoders, and the step in use.
+    """
+    checks = [determined(estimate, fit)]
+    if estimate.status != "rank-deficient":
+        checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error)]
+        checks += [signs(negative), certain(fit, bootstrap), separate(fit), physical(estimate, feasibility), resolved(advice)]
+    return Checklist(tuple(checks), use)
 
 
-def determined(found: Identification) -> Check:
-    """Rank and condition."""
+def determined(estimate: Estimate, fit: Estimate) -> Check:
+    """Rank and condition of W with all columns (`estimate`) and with those of the model (`fit`)."""
     question, limit = "Does the record determine the parameters?", f"full rank, condition number below {COND:g} with unit columns"
-    fits = (found.every, found.carried)
-    failed = next((fit for fit in fits if fit.status != "ok"), None)
+    failed = next((one for one in (estimate, fit) if one.status != "ok"), None)
     if failed is not None and failed.status == "rank-deficient":
         groups = "; ".join(", ".join(group) for group in failed.groups)
         remedy = "record a motion that excites these parameters (symgen excite), or leave them out (estimate: columns)"
         return Check(question, "no", f"No: rank {failed.rank} for {len(failed.names)} parameters, not told apart: {groups}", limit, remedy)
     if failed is not None:
         return Check(question, "no", f"No: {failed.status}, {failed.message.rstrip('.')}", limit, "see the message of the estimator")
-    cond = found.carried.cond_unit
-    text = f"rank {found.carried.rank} of {len(found.carried.names)}, condition number {cond:.3g} with unit columns"
+    cond = fit.cond_unit
+    text = f"rank {fit.rank} of {len(fit.names)}, condition number {cond:.3g} with unit columns"
     return Check(question, "good" if cond <= COND else "doubtful", text, limit, "record a motion with a better condition (symgen excite)")
 
 
-def explained(found: Identification) -> Check:
+def explained(fit: Estimate) -> Check:
     """Error of the fit in total."""
-    error = found.carried.relative_error
-    remedy = "look at the joints below: units, signs and ratios of the drives first, then friction (--friction)"
     return Check(
         "Does the model explain the torques?",
-        graded(error, *TOTAL),
-        f"{error:.1f} % of them stay unexplained",
+        _state(fit.relative_error, *TOTAL),
+        f"{fit.relative_error:.1f} % of them stay unexplained",
         f"{TOTAL[0]:g} % (usable to {TOTAL[1]:g} %)",
-        remedy,
+        "look at the joints below: units, signs and ratios of the drives first, then friction (--friction)",
     )
 
 
-def every_joint(found: Identification) -> list[Check]:
-    """Error of the worst joint, which a total hides."""
-    joints = found.carried.per_joint
+def explained_by_joint(estimate: Estimate, fit: Estimate) -> list[Check]:
+    """Error of the worst joint, which a total hides; no check of a single joint."""
+    joints = fit.per_joint
     if len(joints) < 2:
         return []
     worst = max(joints, key=lambda joint: joint.relative_error)
     text = f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained"
     remedy = (
-        lost_joints(found.every, found.carried)
+        lost_joints(estimate, fit)
         or f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, time shift between position and torque"
     )
-    return [Check("On every joint?", graded(worst.relative_error, *JOINT), text, f"{JOINT[0]:g} % (usable to {JOINT[1]:g} %)", remedy)]
+    return [Check("On every joint?", _state(worst.relative_error, *JOINT), text, f"{JOINT[0]:g} % (usable to {JOINT[1]:g} %)", remedy)]
 
 
-def predicted(found: Identification) -> Check:
-    """Error on data that did not give the parameters."""
-    columns = "essential" if found.carried is found.found.estimate else "all"
-    errors = [p.relative_error for part in found.validation for p in part.predictions if not p.fitted and p.columns == columns]
-    fit, worst = found.carried.relative_error, max(errors, default=float("nan"))
-    limits = [max(times * fit, least) for times, least in UNSEEN]
-    remedy = "fewer parameters (a larger essential.threshold), a longer or richer record"
-    return Check(
-        "Does it predict data it has not seen?",
-        graded(worst, *limits) if np.isfinite(worst) else "open",
-        f"{worst:.1f} % stay unexplained there, {fit:.1f} % where it was fitted",
-        f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
-        remedy,
+def lost_joints(estimate: Estimate, fit: Estimate) -> str:
+    """The joints whose torque the removed parameters explained, and what to do; "" where there is none.
+
+    The threshold of the essential parameters looks at ||Y - W X|| of all joints. Without weights a joint of large forces rules it, such as a lift
+    in N beside a wrist in N m.
+    """
+    whole = {joint.joint: joint.relative_error for joint in estimate.per_joint}
+    lost = [joint for joint in fit.per_joint if joint.relative_error > max(LOST, 2 * whole.get(joint.joint, np.inf))]
+    if not lost:
+        return ""
+    weighted = any(joint.scale != 1.0 for joint in estimate.per_joint)
+    remedy = "lower essential.threshold" if weighted else "weigh the joints by their noise (estimate: {method: wls})"
+    by_all = " and ".join(f"{whole[joint.joint]:.1f} % of joint {joint.joint}" for joint in lost)
+    by_essential = " and ".join(f"{joint.relative_error:.1f} %" for joint in lost)
+    return (
+        f"all parameters leave {by_all} unexplained, the essential ones {by_essential}: "
+        f"parameters of small torques were removed beside large forces; {remedy}"
     )
 
 
-def signs(found: Identification) -> Check:
-    """Friction and motor inertia below zero: told without any extra, and by far the most frequent slip of a robot file or study."""
+def predicted(fit: Estimate, error: float) -> Check:
+    """Largest relative error, %, on data that did not give the parameters; open where it is nan."""
+    limits = [max(times * fit.relative_error, least) for times, least in PREDICTION]
+    return Check(
+        "Does it predict data it has not seen?",
+        _state(error, *limits) if np.isfinite(error) else "open",
+        f"{error:.1f} % stay unexplained there, {fit.relative_error:.1f} % where it was fitted",
+        f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
+        "fewer parameters (a larger essential.threshold), a longer or richer record",
+    )
+
+
+def signs(negative: Sequence[str]) -> Check:
+    """Friction and motor inertias certainly below zero. Usual cause: the sign of a ratio."""
     remedy = "look at the sign of ratio, torque constant and columns of that joint, then at its coupling, units and frame; fit again"
-    text = f"Below zero: {', '.join(found.negative)}" if found.negative else "None is certainly below zero"
+    text = f"Below zero: {', '.join(negative)}" if negative else "None is certainly below zero"
     question = "Have friction and motor inertia the right sign?"
-    return Check(question, "no" if found.negative else "good", text, f"not below zero by {CERTAIN:g} deviations", remedy)
+    return Check(question, "no" if negative else "good", text, f"not below zero by {CERTAIN:g} deviations", remedy)
 
 
-def certain(found: Identification) -> Check:
-    """Deviations without the assumption of independent residuals."""
-    fit, drawn = found.carried, found.trust.scatter
-    deviations = fit.sigma_corrected.copy()
-    for i, name in enumerate(fit.names):
-        if name in drawn.names and fit is found.found.estimate:
-            deviations[i] = np.fmax(deviations[i], drawn.drawn[drawn.names.index(name)])
+def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Check:
+    """Deviations without the assumption of independent residuals; bootstrap : as for `checklist_of`."""
+    deviations = np.fmax(fit.sigma_corrected, [bootstrap.get(name, np.nan) for name in fit.names])
     with np.errstate(divide="ignore", invalid="ignore"):
         percent = 100 * np.where(np.isfinite(deviations), deviations, fit.sigma) / np.abs(fit.X)
     order = np.argsort(-percent)
@@ -195,38 +265,33 @@ def certain(found: Identification) -> Check:
     return Check("Is every value certain?", state, text, f"{DEVIATION:g} % of the value", remedy)
 
 
-def apart(fit: Estimate) -> Check:
-    """Correlation of the estimates that carry the model."""
+def separate(fit: Estimate) -> Check:
+    """Correlations of the estimates, eq. (10)."""
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)
-    pairs = [
-        (fit.names[i], fit.names[k], correlation[i, k])
-        for i, k in zip(*np.nonzero(np.triu(np.abs(correlation) > CORRELATION, 1)), strict=True)
-    ]
+    above = np.triu(np.abs(correlation) > CORRELATION, 1)
+    pairs = [(fit.names[i], fit.names[k], correlation[i, k]) for i, k in zip(*np.nonzero(above), strict=True)]
     text = ", ".join(f"{a} with {b} ({c:+.2f})" for a, b, c in pairs[:4]) + (", ..." if len(pairs) > 4 else "")
     remedy = "use them together or not at all; a motion that moves them apart tells them (symgen excite)"
-    found = f"These trade: {text}" if pairs else "No two of them trade against each other"
-    return Check("Can the values be told apart?", "doubtful" if pairs else "good", found, f"|correlation| below {CORRELATION:g}", remedy)
+    finding = f"These trade: {text}" if pairs else "No two of them trade against each other"
+    return Check("Can the values be told apart?", "doubtful" if pairs else "good", finding, f"|correlation| below {CORRELATION:g}", remedy)
 
 
-def physical(fit: Estimate, feasibility: Feasibility | None) -> Check:
+def physical(estimate: Estimate, feasibility: Feasibility | None) -> Check:
     """Whether a physical robot can have all parameters."""
-    question, limit = (
-        "Can a physical robot have them?",
-        "every pseudo-inertia positive semidefinite, friction and motor inertia not negative",
-    )
-    remedy = "before you simulate or control with them, fit under these conditions (estimate: {method: feasible}); torque prediction is not concerned"
-    if "standard" in fit.details:
+    question = "Can a physical robot have them?"
+    limit = "every pseudo-inertia positive semidefinite, friction and motor inertia not negative"
+    if "standard" in estimate.details:
         return Check(question, "good", "Yes: they were fitted under these conditions", limit)
     if feasibility is None:
-        return Check(
-            question, "open", "Not asked", limit, "pip install symgen[consistency], then symgen report, or symgen identify --physical"
-        )
+        remedy = "symgen report, or symgen identify --physical"
+        return Check(question, "open", "Not asked", limit, remedy)
     if feasibility.feasible:
         return Check(question, "good", f"Yes, margin {feasibility.margin:.2g}", limit)
-    named = ", ".join(name for name, _ in feasibility.blocking)
-    return Check(question, "doubtful", f"No: in the way are {named}", limit, remedy)
+    blocking = ", ".join(name for name, _ in feasibility.blocking)
+    remedy = "before you simulate or control with them, fit under these conditions (estimate: {method: feasible}); torque prediction is not concerned"
+    return Check(question, "doubtful", f"No: in the way are {blocking}", limit, remedy)
 
 
 def resolved(advice: Advice | None) -> Check:
@@ -234,27 +299,21 @@ def resolved(advice: Advice | None) -> Check:
     question, limit = "Does the encoder resolve enough?", f"bias below {NEGLIGIBLE:g} % (usable to {BIASED:g} %)"
     if advice is None:
         return Check(question, "open", "Not asked", limit, "ask with symgen report, or symgen cestac --advise")
-    first = advice.encoders[0].limits
     steps = ", ".join(
-        f"{one.percent:g} % up to {step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}" for one in first
+        f"{one.percent:g} % up to {step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
+        for one in advice.encoders[0].limits
     )
     text = f"Least squares stays within {steps} {advice.place}"
     if not advice.asked:
-        return Check(
-            question,
-            "open",
-            text,
-            limit,
-            "compare these steps with that of your encoder (--encoder STEP, --side motor where it sits there)",
-        )
+        remedy = "compare these steps with that of your encoder (--encoder STEP, --side motor where it sits there)"
+        return Check(question, "open", text, limit, remedy)
     name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
-    text += (
-        f"; at {', '.join(Level(step).label for step in advice.asked)} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})"
-    )
+    labels = ", ".join(Level(step).label for step in advice.asked)
+    text += f"; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})"
     remedy = f"a finer encoder, or an estimator that simulates the closed loop (estimate.method: {', '.join(CLOSED_LOOP)})"
-    return Check(question, graded(error, NEGLIGIBLE, BIASED), text, limit, remedy)
+    return Check(question, _state(error, NEGLIGIBLE, BIASED), text, limit, remedy)
 
 
-def graded(value: float, good: float, usable: float) -> State:
+def _state(value: float, good: float, usable: float) -> State:
     """State of a number that should be small."""
     return "good" if value <= good else "doubtful" if value <= usable else "no"

@@ -27,10 +27,9 @@ from scipy.linalg import qr
 from scipy.optimize import nnls
 
 from runtime.errors import InputError
-from runtime.estimators.block_covariance import block_of_rows, default_block
 from runtime.estimators.linear import assemble
 from runtime.estimators.ols import system
-from runtime.identification.payload import carried
+from runtime.identification.payload import load_columns
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import physical_model
@@ -53,8 +52,19 @@ INDEPENDENT = 1e-9  # smallest part of a unit column that the columns before it 
 class DriveGains:
     """Factors g on the torque constants of the robot file, one per motor; nan where a method has none.
 
-    together, sigma : total least squares over all joints; sigma from resampled blocks of time.   alone, sigma_alone : each motor by itself.
-    constant : torque constants of the robot file, shape (n,), N m/A or N m/V.
+    Attributes
+    ----------
+    joints : tuple of str
+    constant : ndarray, shape (n,), N m/A or N m/V
+        Torque constants of the robot file.
+    together : ndarray, shape (n,)
+        g by total least squares over all joints.
+    sigma : ndarray, shape (n,)
+        Deviation of `together`, from resampled blocks of time.
+    alone : ndarray, shape (n,)
+        g of each motor by least squares on its own joint.
+    sigma_alone : ndarray, shape (n,)
+        Deviation of `alone`.
     """
 
     joints: tuple[str, ...]
@@ -98,81 +108,89 @@ class DriveGains:
 def drive_gains(
     model: GeneratedModel, without: Sequence[Record], loaded: Sequence[Record], study: Study, settings: PayloadSettings, *, seed: int = 1
 ) -> DriveGains:
-    """Gains from joint-side records without and with a load of known mass."""
+    """Gains from joint-side records without and with a load of known mass; seed : of the resampling."""
     if not without or not loaded or "M" not in settings.known:
         raise InputError("drive gains need a record without the load, one with it, and its weighed mass (payload.known: {M: ...})")
     drives = Drives.from_mapping(model.DRIVES or {"ratio": np.eye(len(model.JOINTS))})
-    seen = stack(
+    observation = stack(
         [
-            *(_with_load(model, _observed(model, record, study, drives), settings, 0.0) for record in without),
-            *(_with_load(model, _observed(model, record, study, drives), settings, 1.0) for record in loaded),
+            _with_load(model, _with_motors(model, record, study, drives), settings, mounted)
+            for records, mounted in ((without, 0.0), (loaded, 1.0))
+            for record in records
         ]
     )
     n = drives.n
-    exact, load, V = seen.W[:, : -n - 1], seen.W[:, -n - 1], seen.W[:, -n:]
-    scatter, alone, sigma_alone = _alone(seen, exact, load, V, drives)
-    together, sigma = _together(seen, exact, load, V, scatter, drives, seed)
+    exact, load, V = observation.W[:, : -n - 1], observation.W[:, -n - 1], observation.W[:, -n:]
+    deviations, alone, sigma_alone = _alone(observation, exact, load, drives)
+    together, sigma = _together(observation, exact, load, V, deviations, drives, seed)
     return DriveGains(tuple(map(str, model.JOINTS)), np.asarray(drives.torque_constant), together, sigma, alone, sigma_alone)
 
 
-def _observed(model: GeneratedModel, record: Record, study: Study, drives: Drives) -> Observation:
+def _with_motors(model: GeneratedModel, record: Record, study: Study, drives: Drives) -> Observation:
     """W and Y of a record, and behind W one column per motor: its share in the torque of the joint of the row."""
     states = filtered_states(record.q, record.rate, study.signals)
     selection = select_rows(record, states.qd, study.signals, study.rows)
-    seen = observation_from_states(model, states, decimated_torque(record.tau, selection), selection, files=record.files)
+    observation = observation_from_states(model, states, decimated_torque(record.tau, selection), selection, files=record.files)
     motor = drives.motor_command(record.tau) * drives.torque_constant
     mask = selection.mask.ravel()
     shares = [decimated_torque(motor[:, [m]] * drives.ratio[m], selection).ravel()[mask] for m in range(drives.n)]
-    names = (*seen.names, *(f"motor {m + 1}" for m in range(drives.n)))
-    return replace(seen, W=np.asfortranarray(np.column_stack([seen.W, *shares])), names=names)
+    names = (*observation.names, *(f"motor {m + 1}" for m in range(drives.n)))
+    return replace(observation, W=np.asfortranarray(np.column_stack([observation.W, *shares])), names=names)
 
 
-def _with_load(model: GeneratedModel, seen: Observation, settings: PayloadSettings, load: float) -> Observation:
-    """Columns W, W_Lu (times load), the torque of the known part of the load, motors."""
-    physical = physical_model(model)
-    own = carried(model, physical, settings)
+def _with_load(model: GeneratedModel, observation: Observation, settings: PayloadSettings, mounted: float) -> Observation:
+    """Columns W, W_Lu, the torque of the known part of the load, motors; those of the load zero where it is not mounted."""
+    load = load_columns(model, physical_model(model), settings)
     b = len(model.BASE_PARAMETERS)
-    W, V = seen.W[:, :b], seen.W[:, b:]
-    known = load * (W @ own.known)
-    names = (*seen.names[:b], *(f"{family} of the load" for family in own.unknown), "known load", *seen.names[b:])
-    return replace(seen, W=np.asfortranarray(np.column_stack([W, load * (W @ own.columns), known, V])), names=names)
+    W, V = observation.W[:, :b], observation.W[:, b:]
+    columns = [W, mounted * (W @ load.columns), mounted * (W @ load.known), V]
+    names = (*observation.names[:b], *(f"{family} of the load" for family in load.unknown), "known load", *observation.names[b:])
+    return replace(observation, W=np.asfortranarray(np.column_stack(columns)), names=names)
 
 
-def _alone(seen: Observation, exact: Array, load: Array, V: Array, drives: Drives) -> tuple[Array, Array, Array]:
+def _alone(observation: Observation, exact: Array, load: Array, drives: Drives) -> tuple[Array, Array, Array]:
     """Deviation of the torque residual of every joint, and 1/(coefficient of the load) where one motor moves one joint."""
-    n = seen.n
-    scatter, gain, sigma = np.ones(n), np.full(n, np.nan), np.full(n, np.nan)
+    n = observation.n
+    deviation, gain, sigma = np.ones(n), np.full(n, np.nan), np.full(n, np.nan)
     coupled = drives.ratio != np.diag(np.diag(drives.ratio))
     for j in range(n):
-        rows = seen.joint(j)
+        rows = observation.joint(j)
         A = np.column_stack([exact[rows], load[rows]])
         used = [k for k in range(A.shape[1]) if A[:, k].any()]
-        names = tuple(seen.names[k] for k in used)
+        names = tuple(observation.names[k] for k in used)
         own = Observation(
-            np.asfortranarray(A[:, used]), seen.Y[rows], seen.rows[j : j + 1], names, seen.t[rows], seen.record[rows], seen.rate
+            np.asfortranarray(A[:, used]),
+            observation.Y[rows],
+            observation.rows[j : j + 1],
+            names,
+            observation.t[rows],
+            observation.record[rows],
+            observation.rate,
         )
-        rows_of = system(own, EstimateSettings())
-        fit = assemble(rows_of, rows_of.solve())
-        scatter[j] = fit.sigma_rho
+        factored = system(own, EstimateSettings())
+        fit = assemble(factored, factored.solve())
+        deviation[j] = fit.sigma_rho
         if "known load" in names and not coupled[j].any() and not coupled[:, j].any():
             k = names.index("known load")
             gain[j] = 1 / fit.X[k]
             sigma[j] = max(fit.sigma[k], fit.sigma_corrected[k]) * gain[j] ** 2
-    return scatter, gain, sigma
+    return deviation, gain, sigma
 
 
-def _together(seen: Observation, exact: Array, load: Array, V: Array, scatter: Array, drives: Drives, seed: int) -> tuple[Array, Array]:
-    """g by total least squares with exact columns, and its scatter over resampled blocks of time."""
-    weight = np.repeat(1 / np.maximum(scatter, 1e-12 * np.abs(seen.Y).max()), seen.rows)
+def _together(
+    observation: Observation, exact: Array, load: Array, V: Array, deviation: Array, drives: Drives, seed: int
+) -> tuple[Array, Array]:
+    """g by total least squares with exact columns, and its deviation over resampled blocks of time."""
+    weight = np.repeat(1 / np.maximum(deviation, 1e-12 * np.abs(observation.Y).max()), observation.rows)
     E = exact[:, _independent(exact)]
     A = np.column_stack([E, load, V]) * weight[:, None]
-    D = _column_deviations(seen.rows, scatter, drives)
-    blocks = block_of_rows(seen, default_block(seen))
+    D = _column_deviations(observation.rows, deviation, drives)
+    blocks = observation.blocks()
     parts = [triangularise(A[blocks == k]) for k in range(int(blocks.max()) + 1)]
-    found = _gains(triangularise(np.vstack(parts)), D)
+    g = _gains(triangularise(np.vstack(parts)), D)
     rng = np.random.default_rng(seed)
     runs = [_gains(triangularise(np.vstack([parts[k] for k in rng.integers(len(parts), size=len(parts))])), D) for _ in range(RUNS)]
-    return found, np.asarray(np.std(runs, axis=0, ddof=1))
+    return g, np.asarray(np.std(runs, axis=0, ddof=1))
 
 
 def _gains(R: Array, D: Array) -> Array:
@@ -183,11 +201,11 @@ def _gains(R: Array, D: Array) -> Array:
     return np.asarray(g / along if along else np.full(n, np.nan))
 
 
-def _column_deviations(rows: Sequence[int], scatter: Array, drives: Drives) -> Array:
+def _column_deviations(rows: Sequence[int], deviation: Array, drives: Drives) -> Array:
     """Deviations of the errors of the columns of V with rows of joint j divided by s_j: s_j^2 = sum_m (R_mj sigma_m)^2."""
-    largest = (scatter**2).max()
-    variance = largest * nnls(drives.ratio.T**2, scatter**2 / largest)[0]  # scaled: nnls of SciPy 1.13 takes tiny values for zero
-    weighted = (drives.ratio**2 * variance[:, None] / scatter**2) @ np.asarray(rows, dtype=float)
+    largest = (deviation**2).max()
+    variance = largest * nnls(drives.ratio.T**2, deviation**2 / largest)[0]  # scaled: nnls of SciPy 1.13 takes tiny values for zero
+    weighted = (drives.ratio**2 * variance[:, None] / deviation**2) @ np.asarray(rows, dtype=float)
     return np.asarray(np.sqrt(np.maximum(weighted, 1e-6 * weighted.max())))
 
 

@@ -26,12 +26,10 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.estimators.block_covariance import block_of_rows, default_block
 from runtime.estimators.estimate import Estimate
 from runtime.identification.friction_laws import (
     LAWS,
     Terms,
-    correlation_time,
     deviations,
     fitted,
     held_out_error,
@@ -40,6 +38,7 @@ from runtime.identification.friction_laws import (
     p_value,
     percent,
 )
+from runtime.identification.residuals import correlation_time, residual_correlation
 from runtime.model.generated import GeneratedModel, require
 from runtime.model.inertia import physical_model
 from runtime.observation.filters import decimated, filtered_states
@@ -62,8 +61,21 @@ LEVEL = 0.01
 class FrictionLaw:
     """One law fitted to one joint.
 
-    error : 100 ||f - law|| / ||f|| in %, on all rows; held_out : on blocks that did not fit it.   aic : difference to the first law.
-    p_value : of the F-test against the first law, 1 for itself.
+    Attributes
+    ----------
+    name : str
+    parameters : mapping of str to float
+        Values by name, SI.
+    sigma : mapping of str to float
+        Deviations by blocks of time.
+    error : float, %
+        100 ||f - law|| / ||f|| on all rows.
+    held_out : float, %
+        The same on blocks of time that did not fit the law.
+    aic : float
+        Akaike's criterion minus that of the first law.
+    p_value : float
+        Of the F-test against the first law; 1 for the first law itself.
     """
 
     name: str
@@ -77,10 +89,27 @@ class FrictionLaw:
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve:
-    """Friction of one joint, N m or N against rad/s or m/s.
+    """Friction of one joint against its velocity.
 
-    centre, mean, half : of the bins of velocity with their 95 % intervals.   laws : the first is Coulomb and viscous; chosen : the one that predicts.
-    drawn : values of each law that depends on velocity alone at `centre`; with load at its mean there.
+    Attributes
+    ----------
+    joint : str
+    v : ndarray, shape (N,), rad/s or m/s
+        Velocity at the rows.
+    f : ndarray, shape (N,), N m or N
+        Friction torque at the rows.
+    centre : ndarray, shape (k,), rad/s or m/s
+        Mean velocity of each bin.
+    mean : ndarray, shape (k,), N m or N
+        Mean friction of each bin.
+    half : ndarray, shape (k,), N m or N
+        Half width of the 95 % interval of the mean.
+    laws : tuple of FrictionLaw
+        The first is Coulomb and viscous.
+    law_name : str
+        Name of the law that predicts.
+    law_torques : mapping of str to ndarray, shape (k,), N m or N
+        Mean torque of each law in each bin, by name of the law.
     """
 
     joint: str
@@ -90,27 +119,27 @@ class FrictionCurve:
     mean: Array
     half: Array
     laws: tuple[FrictionLaw, ...]
-    chosen: str
-    drawn: Mapping[str, Array]
+    law_name: str
+    law_torques: Mapping[str, Array]
 
     @property
     def law(self) -> FrictionLaw:
-        """The chosen law."""
-        return next(law for law in self.laws if law.name == self.chosen)
+        """The law that predicts."""
+        return next(law for law in self.laws if law.name == self.law_name)
 
     def to_table(self) -> str:
-        """Laws line by line, then the parameters of the chosen one."""
+        """Laws line by line, then the parameters of the one that predicts."""
         rows: list[Sequence[str]] = [(f"joint {self.joint}", "error %", "held out %", "AIC", "p of F", "")]
         for law in self.laws:
             cells = (f"{law.error:.3f}", f"{law.held_out:.3f}", f"{law.aic:+.1f}", f"{law.p_value:.2g}")
-            rows.append((law.name, *cells, "chosen" if law.name == self.chosen else ""))
+            rows.append((law.name, *cells, "chosen" if law.name == self.law_name else ""))
         values = ", ".join(f"{name} {x:.4g} +- {self.law.sigma[name]:.2g}" for name, x in self.law.parameters.items())
-        return f"{aligned(rows)}\n{self.chosen}: {values}" + (f"\n{self.note}" if self.note else "")
+        return f"{aligned(rows)}\n{self.law_name}: {values}" + (f"\n{self.note}" if self.note else "")
 
     @property
     def label(self) -> str:
-        """The chosen law, told apart where its Stribeck term makes no peak."""
-        return f"{self.chosen} (no peak)" if self.law.parameters.get("FST", 1.0) < 0 else self.chosen
+        """Name of the law that predicts; says where its Stribeck term makes no peak."""
+        return f"{self.law_name} (no peak)" if self.law.parameters.get("FST", 1.0) < 0 else self.law_name
 
     @property
     def note(self) -> str:
@@ -125,11 +154,11 @@ class FrictionCurve:
     def summary(self) -> dict[str, Any]:
         """For JSON."""
         curve = {"velocity": self.centre, "torque": self.mean, "half_interval": self.half}
-        return {"joint": self.joint, "chosen": self.chosen, "note": self.note, "laws": self.laws, "curve": curve}
+        return {"joint": self.joint, "chosen": self.law_name, "note": self.note, "laws": self.laws, "curve": curve}
 
 
 def friction_curves(model: GeneratedModel, records: Sequence[Record], study: Study, fit: Estimate) -> tuple[FrictionCurve, ...]:
-    """One curve per joint of the records, joint side, with the parameters of `fit`."""
+    """Friction against velocity, one curve per joint, from records of the joint side and an estimate of all parameters."""
     require(model, "inverse_dynamics")
     parts = [_terms(model, record, study, fit, k) for k, record in enumerate(records)]
     return tuple(_curve(str(model.JOINTS[j]), joined([part[j] for part in parts])) for j in range(len(model.JOINTS)))
@@ -149,20 +178,20 @@ def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, n
     """Terms of every joint of one record."""
     states = filtered_states(record.q, record.rate, study.signals)
     selection = select_rows(record, states.qd, study.signals, study.rows)
-    seen = observation_from_states(model, states, decimated_torque(record.tau, selection), selection)
+    observation = observation_from_states(model, states, decimated_torque(record.tau, selection), selection)
     window = states[selection.samples]
     X = np.array([fit[name] if name in fit.names else 0.0 for name in model.BASE_PARAMETERS])
-    block = block_of_rows(seen, default_block(seen))
+    block = observation.blocks()
 
     def at_rows(signal: Array, j: int) -> Array:
         return decimated(signal, selection.factor, selection.signals.decimate)[..., selection.mask[j]]
 
     terms = []
-    for j in range(seen.n):
+    for j in range(observation.n):
         rest = X.copy()
         rest[own_friction(model, j)] = 0.0
-        rows, v = seen.joint(j), window.qd[:, j]
-        carried = np.abs(cast(Any, model).inverse_dynamics(window.q, window.qd, window.qdd, rest)[:, j])
+        rows, v = observation.joint(j), window.qd[:, j]
+        transmitted = np.abs(cast(Any, model).inverse_dynamics(window.q, window.qd, window.qdd, rest)[:, j])
         s = np.sign(v)
         signals = {
             "FS": s,
@@ -172,7 +201,7 @@ def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, n
             "FVP": np.maximum(v, 0),
             "FSN": (v < 0) * -1.0,
             "FVN": np.minimum(v, 0),
-            "FL": s * carried,
+            "FL": s * transmitted,
         }
 
         def excess(VS: float, v: Array = v, j: int = j) -> Array:
@@ -180,20 +209,20 @@ def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, n
 
         linear = {name: at_rows(signal, j) for name, signal in signals.items()}
         own_block = block[rows] + (number << 32)
-        terms.append(Terms(seen.Y[rows] - seen.W[rows] @ rest, linear["FV"], own_block, linear, excess))
+        terms.append(Terms(observation.Y[rows] - observation.W[rows] @ rest, linear["FV"], own_block, linear, excess))
     return terms
 
 
 def _curve(joint: str, terms: Terms) -> FrictionCurve:
     if len(terms.f) < 10 * len(LAWS["stribeck+load"]):
         raise InputError(f"{len(terms.f)} rows of joint {joint}; a friction curve needs more of the record (rows.window, rows.low_speed)")
-    every = np.ones(len(terms.f), dtype=bool)
+    all_rows = np.ones(len(terms.f), dtype=bool)
     even = terms.block % 2 == 0
-    fits = {name: fitted(terms, names, every) for name, names in LAWS.items()}
+    fits = {name: fitted(terms, names, all_rows) for name, names in LAWS.items()}
     first = next(iter(LAWS))
-    residuals = {name: terms.f - law_torque(terms, found) for name, found in fits.items()}
+    residuals = {name: terms.f - law_torque(terms, fit) for name, fit in fits.items()}
     squares = {name: float(r @ r) for name, r in residuals.items()}
-    count = len(terms.f) / correlation_time(residuals["stribeck+load"])
+    count = len(terms.f) / correlation_time(residual_correlation(residuals["stribeck+load"]))
     laws = []
     for name, names in LAWS.items():
         aic = count * np.log(squares[name] / squares[first]) + 2 * (len(names) - len(LAWS[first]))
@@ -209,11 +238,11 @@ def _curve(joint: str, terms: Terms) -> FrictionCurve:
             )
         )
     centre, mean, half, mean_of = _bins(terms)
-    drawn = {name: mean_of(law_torque(terms, found)) for name, found in fits.items()}
-    return FrictionCurve(joint, terms.v, terms.f, centre, mean, half, tuple(laws), _chosen(laws), drawn)
+    torques = {name: mean_of(law_torque(terms, fit)) for name, fit in fits.items()}
+    return FrictionCurve(joint, terms.v, terms.f, centre, mean, half, tuple(laws), _predicting(laws), torques)
 
 
-def _chosen(laws: Sequence[FrictionLaw]) -> str:
+def _predicting(laws: Sequence[FrictionLaw]) -> str:
     """The smallest held-out error among the laws that are worth their terms; the first where none is."""
     first, *others = laws
     worth = [law for law in others if law.p_value < LEVEL and law.held_out < (1 - GAIN) * first.held_out]
@@ -221,7 +250,7 @@ def _chosen(laws: Sequence[FrictionLaw]) -> str:
 
 
 def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
-    """Centres, means and half intervals over bins of about equal numbers of rows, none across standstill; and what averages others alike."""
+    """Centres, means and half intervals over bins of about equal numbers of rows, none across standstill; and the function that averages over them."""
     sides = [terms.v[terms.v < 0], terms.v[terms.v >= 0]]
     shares = [max(round(BINS * len(side) / len(terms.v)), 1) for side in sides]
     inner = [np.quantile(side, np.linspace(0, 1, k + 1)) for side, k in zip(sides, shares, strict=True) if len(side)]

@@ -14,6 +14,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import f as fisher
 
 from runtime.estimators.block_covariance import block_covariance
+from runtime.observation.system import split_rows
 
 Array = np.ndarray
 
@@ -22,9 +23,20 @@ SLOWEST, FASTEST = 0.005, 0.5  # of the largest speed: where VS is searched
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Signals of one joint at the rows: friction torque f, velocity v, and the terms of the laws, each of shape (N,); block of time of each row.
+    """Signals of one joint at the rows of its curve.
 
-    excess : the term of FST for a given VS.
+    Attributes
+    ----------
+    f : ndarray, shape (N,), N m or N
+        Friction torque.
+    v : ndarray, shape (N,), rad/s or m/s
+        Velocity.
+    block : ndarray of int, shape (N,)
+        Block of time of each row.
+    linear : mapping of str to ndarray, shape (N,)
+        Terms of the laws by the name of their parameter.
+    excess : function of float to ndarray, shape (N,)
+        The term of FST for a given VS.
     """
 
     f: Array
@@ -75,9 +87,10 @@ def fitted(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
     return {**dict(zip(linear, map(float, solved(VS)[0]), strict=True)), "VS": VS}
 
 
-def law_torque(terms: Terms, found: Mapping[str, float]) -> Array:
-    names = tuple(found)
-    return np.asarray(_columns(terms, names, found.get("VS")) @ [found[name] for name in names if name != "VS"])
+def law_torque(terms: Terms, law: Mapping[str, float]) -> Array:
+    """Torque of a law at the rows, shape (N,), by the values of its parameters."""
+    names = tuple(law)
+    return np.asarray(_columns(terms, names, law.get("VS")) @ [law[name] for name in names if name != "VS"])
 
 
 def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
@@ -88,27 +101,19 @@ def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
     return percent(residual, terms.f)
 
 
-def deviations(terms: Terms, found: Mapping[str, float], residual: Array) -> dict[str, float]:
+def deviations(terms: Terms, law: Mapping[str, float], residual: Array) -> dict[str, float]:
     """Deviations by blocks of time, VS by its derivative."""
-    A = _columns(terms, tuple(found), found.get("VS"))
-    if "VS" in found:
-        VS, h = found["VS"], 1e-4 * found["VS"]
-        A = np.column_stack([A, found["FST"] * (terms.excess(VS + h) - terms.excess(VS - h)) / (2 * h)])
+    A = _columns(terms, tuple(law), law.get("VS"))
+    if "VS" in law:
+        VS, h = law["VS"], 1e-4 * law["VS"]
+        A = np.column_stack([A, law["FST"] * (terms.excess(VS + h) - terms.excess(VS - h)) / (2 * h)])
     T = np.linalg.pinv(np.linalg.qr(A, mode="r"))
-    return dict(zip(found, map(float, np.sqrt(np.diag(block_covariance(A, residual, terms.block, T)))), strict=True))
-
-
-def correlation_time(residual: Array) -> float:
-    """1 + 2 sum of the autocorrelations of a residual up to the first that is not positive, in rows; at least 1."""
-    r = residual - residual.mean()
-    spectrum = np.abs(np.fft.rfft(r, 2 * len(r))) ** 2
-    rho = np.fft.irfft(spectrum)[: len(r)]
-    rho = rho / rho[0] if rho[0] > 0 else np.zeros(len(r))
-    end = int(np.argmax(rho <= 0)) or len(r)
-    return float(max(1 + 2 * rho[1:end].sum(), 1.0))
+    blocks = split_rows(np.column_stack([A, residual]), terms.block)
+    return dict(zip(law, map(float, np.sqrt(np.diag(block_covariance(blocks, np.zeros(A.shape[1]), T)))), strict=True))
 
 
 def p_value(squares_first: float, squares: float, terms_first: int, terms: int, count: float) -> float:
+    """Of the F-test of a law against the first one, from their squared residuals, numbers of terms, and independent samples."""
     if terms == terms_first or squares <= 0 or count <= terms:
         return 1.0
     F = max(squares_first / squares - 1, 0.0) * (count - terms) / (terms - terms_first)
@@ -116,5 +121,6 @@ def p_value(squares_first: float, squares: float, terms_first: int, terms: int, 
 
 
 def percent(residual: Array, of: Array) -> float:
+    """100 ||residual|| / ||of||, in %."""
     norm = float(np.linalg.norm(of))
     return 100 * float(np.linalg.norm(residual)) / norm if norm > 0 else float("nan")

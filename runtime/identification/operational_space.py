@@ -42,8 +42,16 @@ Linear = Callable[[Array], Array]  # X of shape (b,) to a quantity of shape (N, 
 
 
 @dataclass(frozen=True, eq=False)
-class Felt:
-    """Values at N configurations and their standard deviations, of one shape (N, ...); nan where the configuration is singular."""
+class Quantity:
+    """A quantity at N configurations.
+
+    Attributes
+    ----------
+    value : ndarray, shape (N, ...)
+        nan where the configuration is singular.
+    sigma : ndarray, shape (N, ...)
+        Standard deviation; nan besides where the quantity depends on a parameter that the record does not determine.
+    """
 
     value: Array
     sigma: Array
@@ -51,24 +59,39 @@ class Felt:
 
 @dataclass(frozen=True, eq=False)
 class OperationalSpace:
-    """What is felt at N configurations, in m coordinates of frame 0 (`axes`). SI: m, kg, N, N/m.
+    """What the user feels at N configurations, in m coordinates of frame 0 (`axes`). SI.
 
-    position : ndarray, shape (N, 3), of the handle.   singular : bool, shape (N,).   conditioning : shape (N,), smallest over largest singular value of J.
-    indefinite : bool, shape (N,), where the estimated A is not positive definite.
-    mass : (N, m, m), Lambda.   principal : (N, m), its eigenvalues, ascending, along the columns of `directions`, (N, m, m).
-    friction : (N, m), for motion along each coordinate.   static_force : (N, m).   stiffness : (N, m, m).
+    Attributes
+    ----------
+    position : ndarray, shape (N, 3), m
+        Of the handle, frame 0.
+    singular : ndarray of bool, shape (N,)
+    conditioning : ndarray, shape (N,)
+        Smallest over largest singular value of J.
+    indefinite : ndarray of bool, shape (N,)
+        Where the estimated A is not positive definite.
+    mass : Quantity, shape (N, m, m), kg
+        Lambda.
+    principal : Quantity, shape (N, m), kg
+        Eigenvalues of Lambda, ascending.
+    directions : ndarray, shape (N, m, m)
+        Eigenvectors of Lambda in the columns, frame 0.
+    friction : Quantity, shape (N, m), N
+        For a motion along each coordinate.
+    static_force : Quantity, shape (N, m), N
+    stiffness : Quantity, shape (N, m, m), N/m
     """
 
     position: Array
     singular: Array
     conditioning: Array
     indefinite: Array
-    mass: Felt
-    principal: Felt
+    mass: Quantity
+    principal: Quantity
     directions: Array
-    friction: Felt
-    static_force: Felt
-    stiffness: Felt
+    friction: Quantity
+    static_force: Quantity
+    stiffness: Quantity
 
     @property
     def message(self) -> str:
@@ -121,20 +144,20 @@ def operational_space(
         raise InputError(f"{model.NAME}: frame {frame}, speed {speed} m/s; expected a frame from 1 to {frames} and a positive speed")
     X, C = parameters_of(model, estimate)
     handle = _Handle(model, q, frame, list(axes), dict(constants or {}), singular, X)
-    mass = _felt(handle.mass, X, C)
+    mass = _quantity(handle.mass, X, C)
     principal, directions = _principal(mass.value, handle.lost)
-    along = _felt(lambda X: _array("nap,nab,nbp->np", directions, handle.mass(X), directions), X, C)
+    along = _quantity(lambda X: _array("nap,nab,nbp->np", directions, handle.mass(X), directions), X, C)
     return OperationalSpace(
         position=handle.position,
         singular=handle.singular,
         conditioning=handle.conditioning,
         indefinite=handle.indefinite,
         mass=mass,
-        principal=Felt(principal, along.sigma),
+        principal=Quantity(principal, along.sigma),
         directions=directions,
-        friction=_felt(lambda X: handle.friction(X, speed), X, C),
-        static_force=_felt(handle.static_force, X, C),
-        stiffness=_felt(handle.stiffness, X, C),
+        friction=_quantity(lambda X: handle.friction(X, speed), X, C),
+        static_force=_quantity(handle.static_force, X, C),
+        stiffness=_quantity(handle.stiffness, X, C),
     )
 
 
@@ -212,15 +235,23 @@ def parameters_of(model: GeneratedModel, estimate: Estimate) -> tuple[Array, Arr
     return X, C
 
 
-def _felt(quantity: Linear, X: Array, C: Array) -> Felt:
-    """A quantity linear in X with its deviation, sqrt(g' C g); directions without variance are not evaluated."""
-    variances, vectors = np.linalg.eigh(C)
+def _quantity(quantity: Linear, X: Array, C: Array) -> Quantity:
+    """A quantity linear in X with its deviation, sqrt(g' C g); directions without variance are not evaluated.
+
+    Where C is nan in the row of a parameter, which the record then does not determine, a quantity that depends on this parameter has the deviation nan.
+    """
     value = quantity(X)
     total = np.zeros_like(value)
+    known = np.isfinite(np.diag(C))
+    for direction in np.eye(len(X))[~known]:
+        total[quantity(direction) != 0] = np.nan
+    variances, vectors = np.linalg.eigh(C[np.ix_(known, known)])
     for variance, vector in zip(variances, vectors.T, strict=True):
         if variance > 0:
-            total += variance * quantity(vector) ** 2
-    return Felt(value, np.sqrt(total))
+            direction = np.zeros(len(X))
+            direction[known] = vector
+            total += variance * quantity(direction) ** 2
+    return Quantity(value, np.sqrt(total))
 
 
 def _principal(mass: Array, lost: Array) -> tuple[Array, Array]:

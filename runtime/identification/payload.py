@@ -3,8 +3,8 @@
     [Y_a; Y_b - W_Lk chi_Lk] = [[W_a, 0], [W_b, W_Lu]] [X; chi_Lu]        W_L = W K_L
 
 a without, b with the load; K_L the ten columns of K = dX/dchi of the link that carries it, so chi_L are XX ... M of the load alone at the frame of
-that link, or with K_L A (`runtime.model.mount`) at a frame fixed to it. Known ones (a weighed M) move to the left. What of the ten the motion shows is judged as for any other parameter. Where friction
-changes with the load, rows b have friction columns of their own.
+that link, or with K_L A (`runtime.model.mount`) at a frame fixed to it. Known ones (a weighed M) move to the left. A parameter of the load is reported
+only if it has an effect; its deviation says whether the motion excites it. Where friction changes with the load, rows b have friction columns of their own.
 
     X_b - X_a = K_L chi_L,    covariance C_a + C_b
 
@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import estimate
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import estimate_of
 from runtime.estimators.solution import Solution, solve
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
@@ -42,10 +42,23 @@ FRICTION = ("viscous", "coulomb")
 
 @dataclass(frozen=True, eq=False)
 class Payload:
-    """The load on link `link`: ten parameters at its frame, or at `frame` fixed to it, kg, kg m, kg m^2.
+    """A load fixed to a link: ten inertial parameters at the frame of the link, or at a frame fixed to it.
 
-    names, value, sigma : of the unknown ones that have an effect, in the order of XX .. M; sigma by time blocks where known, else eq. (10).
-    known : given ones.   estimate : the joint solution with all base parameters, or None where it came from two estimates.
+    Attributes
+    ----------
+    link : int
+        Number of the link that carries the load.
+    names : tuple of str
+        Families XX .. M of the unknown parameters that have an effect, in that order.
+    value : ndarray, shape (u,), kg m^2, kg m or kg
+    sigma : ndarray, shape (u,)
+        Deviations by blocks of time where known, else eq. (10).
+    known : mapping of str to float
+        Parameters that were given, by family.
+    estimate : Estimate or None
+        All base parameters and those of the load, fitted together; None of a difference of two estimates.
+    frame : int or None
+        Number of the frame at which the parameters are meant; None: that of the link.
     """
 
     link: int
@@ -72,14 +85,14 @@ class Payload:
         """One line per parameter."""
         rows: list[Sequence[str]] = [(f"load on {self.place}", "value", "sigma", "unit")]
         rows += [(name, f"{self.known[name]:.6g}", "given", _unit(name)) for name in self.known]
-        found = zip(self.names, self.value, self.sigma, strict=True)
-        rows += [(name, f"{x:.6g}", f"{s:.2g}" if np.isfinite(s) else "-", _unit(name)) for name, x, s in found]
+        estimates = zip(self.names, self.value, self.sigma, strict=True)
+        rows += [(name, f"{x:.6g}", f"{s:.2g}" if np.isfinite(s) else "-", _unit(name)) for name, x, s in estimates]
         return aligned(rows)
 
     def summary(self) -> dict[str, Any]:
         """For JSON."""
-        found = {n: {"value": x, "sigma": s} for n, x, s in zip(self.names, self.value, self.sigma, strict=True)}
-        return {"link": self.link, "frame": self.frame or self.link, "known": dict(self.known), "parameters": found}
+        parameters = {n: {"value": x, "sigma": s} for n, x, s in zip(self.names, self.value, self.sigma, strict=True)}
+        return {"link": self.link, "frame": self.frame or self.link, "known": dict(self.known), "parameters": parameters}
 
 
 def payload(
@@ -91,43 +104,44 @@ def payload(
     *,
     provenance: Mapping[str, Any] | None = None,
 ) -> Payload:
-    """The joint solution of observations without and with the load, all base columns in each, by a linear method (ols or wls)."""
+    """The load from observations without and with it, fitted together with all base parameters by a linear method (ols or wls)."""
     if not without or not loaded:
         raise InputError("a payload needs a record without it and one with it (record, payload.record)")
     physical = physical_model(model)
-    load = carried(model, physical, settings)
+    load = load_columns(model, physical, settings)
     friction = friction_columns(model, physical) if settings.friction else []
     names = (*model.BASE_PARAMETERS, *(f"{family}{LOAD}" for family in load.unknown), *(model.BASE_PARAMETERS[k] + LOAD for k in friction))
 
-    def extended(seen: Observation, there: float) -> Observation:
-        own = there * np.hstack([seen.W @ load.columns, seen.W[:, friction]])
-        Y = seen.Y - there * (seen.W @ load.known)
-        return replace(seen, W=np.asfortranarray(np.hstack([seen.W, own])), Y=Y, names=names)
+    def extended(rows: Observation, mounted: float) -> Observation:
+        """Columns of the load behind W, zero where it is not mounted; the torque of its known part moved to Y."""
+        of_load = mounted * np.hstack([rows.W @ load.columns, rows.W[:, friction]])
+        Y = rows.Y - mounted * (rows.W @ load.known)
+        return replace(rows, W=np.asfortranarray(np.hstack([rows.W, of_load])), Y=Y, names=names)
 
     both = stack([extended(stack(without), 0.0), extended(stack(loaded), 1.0)])
-    found = estimate(both, method, model=model, provenance=provenance)
-    units = {**found.units, **{f"{family}{LOAD}": _unit(family) for family in load.unknown}}
-    units |= {model.BASE_PARAMETERS[k] + LOAD: found.units.get(model.BASE_PARAMETERS[k], "") for k in friction}
-    found = replace(found, units=units)
-    place = [found.names.index(f"{family}{LOAD}") for family in load.unknown]
-    sigma = np.where(np.isnan(found.sigma_corrected), found.sigma, np.fmax(found.sigma, found.sigma_corrected))
-    return Payload(load.mount.link, load.unknown, found.X[place], sigma[place], dict(settings.known), found, load.mount.frame)
+    fit = estimate_of(both, method, model=model, provenance=provenance)
+    units = {**fit.units, **{f"{family}{LOAD}": _unit(family) for family in load.unknown}}
+    units |= {model.BASE_PARAMETERS[k] + LOAD: fit.units.get(model.BASE_PARAMETERS[k], "") for k in friction}
+    fit = replace(fit, units=units)
+    place = [fit.names.index(f"{family}{LOAD}") for family in load.unknown]
+    sigma = np.where(np.isnan(fit.sigma_corrected), fit.sigma, np.fmax(fit.sigma, fit.sigma_corrected))
+    return Payload(load.mount.link, load.unknown, fit.X[place], sigma[place], dict(settings.known), fit, load.mount.frame)
 
 
 def payload_difference(model: GeneratedModel, without: Estimate, loaded: Estimate, settings: PayloadSettings) -> Payload:
     """The load from two estimates of all base parameters, weighted by the inverse of C_a + C_b."""
     physical = physical_model(model)
-    load = carried(model, physical, settings)
+    load = load_columns(model, physical, settings)
     for fit in (without, loaded):
         if fit.names != physical.base or not np.isfinite(fit.covariance).all():
             raise InputError("the difference needs estimates of all base parameters of the model, each with a full covariance")
     L = np.linalg.cholesky(without.covariance + loaded.covariance)
     dX = loaded.X - without.X - load.known
-    found = _least_squares(np.linalg.solve(L, load.columns), np.linalg.solve(L, dX), load.unknown)
-    sigma = np.sqrt(found.variances())
-    for group in found.groups:
+    solution = _least_squares(np.linalg.solve(L, load.columns), np.linalg.solve(L, dX), load.unknown)
+    sigma = np.sqrt(solution.variances())
+    for group in solution.groups:
         sigma[[load.unknown.index(name) for name in group]] = np.nan
-    return Payload(load.mount.link, load.unknown, found.X, sigma, dict(settings.known), frame=load.mount.frame)
+    return Payload(load.mount.link, load.unknown, solution.X, sigma, dict(settings.known), frame=load.mount.frame)
 
 
 def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int]:
@@ -138,8 +152,20 @@ def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
-    """mount : where the load is fixed.   unknown : families with an effect.   columns : dX/dchi of these, shape (b, u).   known : X of the given ones."""
+class LoadColumns:
+    """How a load enters the base parameters.
+
+    Attributes
+    ----------
+    mount : Mount
+        Where the load is fixed.
+    unknown : tuple of str
+        Families of the unknown parameters that have an effect.
+    columns : ndarray, shape (b, u)
+        dX/dchi of the unknown parameters.
+    known : ndarray, shape (b,)
+        Base parameters of the given ones.
+    """
 
     mount: Mount
     unknown: tuple[str, ...]
@@ -147,15 +173,15 @@ class Carried:
     known: Array
 
 
-def carried(model: GeneratedModel, physical: PhysicalModel, settings: PayloadSettings) -> Carried:
-    """What of a load the settings ask for; SettingsError where there is no such link or frame."""
+def load_columns(model: GeneratedModel, physical: PhysicalModel, settings: PayloadSettings) -> LoadColumns:
+    """Columns of the load of the settings; SettingsError where there is no such link or frame."""
     try:
         place = mount(model, settings.frame, settings.link)
     except InputError as e:
         raise SettingsError(e.message, path=("payload", "frame" if settings.frame is not None else "link")) from e
     K = place.columns(physical)
     free = [k for k, family in enumerate(INERTIAL) if family not in settings.known and K[:, k].any()]
-    return Carried(place, tuple(INERTIAL[k] for k in free), K[:, free], K @ load_vector(settings.known))
+    return LoadColumns(place, tuple(INERTIAL[k] for k in free), K[:, free], K @ load_vector(settings.known))
 
 
 def _least_squares(A: Array, y: Array, names: Sequence[str]) -> Solution:

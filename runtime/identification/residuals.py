@@ -3,9 +3,9 @@
 Eqs. (9), (10) take the residuals of a joint as independent. With rho_k their correlation at a distance of k rows,
 
     Q = N (N + 2) sum_k rho_k^2 / (N - k),  k = 1 ... m        chi^2 with m degrees of freedom if they are         Ljung and Box (1978)
-    N_eff = N / (1 + 2 sum_k rho_k)                            rows that say as much about a mean; the sum ends before the first negative rho_k
+    N_eff = N / (1 + 2 sum_k rho_k)                            rows that say as much about a mean; the sum ends before the first rho_k <= 0
 
-Rows left out and other records are gaps: a pair counts only where both its rows exist. The spectrum tells what is left over: a peak at the frequency
+Rows left out and other records are gaps: a pair counts only where both its rows exist, in one record. The spectrum tells what is left over: a peak at the frequency
 of the motion is model error, one near the cut-off is filtered noise.
 """
 
@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import welch
 from scipy.special import chdtrc
 
@@ -27,14 +28,34 @@ SIGNIFICANT = 0.05
 """p-value below which residuals are not white."""
 SEGMENT = 256
 """Samples of one segment of the spectrum."""
+SEPARATE = 1000
+"""Rows of one joint left out one after the other from which the next one counts as of another record."""
 
 
 @dataclass(frozen=True, eq=False)
 class Whiteness:
     """Residuals of one joint.
 
-    correlation : rho_k, k = 1 ... lags.   Q, p : Ljung-Box.   effective_rows : N_eff of `rows`.
-    frequency : Hz, density : (N m)^2/Hz (or N^2/Hz), shape (f,) each.   peak : Hz, of the largest density.   half : Hz, below which half of the power lies.
+    Attributes
+    ----------
+    joint : str
+        Label of the joint.
+    rows : int
+        Number of residuals, N.
+    correlation : ndarray, shape (lags,)
+        rho_k, k = 1 ... lags.
+    Q, p : float
+        Ljung-Box statistic and its probability.
+    effective_rows : float
+        N_eff.
+    frequency : ndarray, shape (f,), Hz
+        Frequencies of the spectrum.
+    density : ndarray, shape (f,), (N m)^2/Hz or N^2/Hz
+        Power density.
+    peak : float, Hz
+        Frequency of the largest density.
+    half : float, Hz
+        Frequency below which half of the power lies.
     """
 
     joint: str
@@ -64,27 +85,24 @@ def joint_whiteness(joint: JointComparison, rate: float, lags: int = LAGS) -> Wh
     N = len(joint.t)
     m = max(1, min(lags, N // 5))
     error = joint.error - joint.error.mean()
-    place = _places(joint.t, rate, m)
-    grid, there = np.zeros(place[-1] + 1 + m), np.zeros(place[-1] + 1 + m)
-    grid[place], there[place] = error, 1.0
-    variance = float(error @ error) / N
-    length = len(grid) - m
-    pairs = np.array([there[:length] @ there[k : k + length] for k in range(1, m + 1)])
-    products = np.array([grid[:length] @ grid[k : k + length] for k in range(1, m + 1)])
-    rho = products / np.maximum(pairs, 1) / variance if variance > 0 else np.zeros(m)
-    used = pairs > 0
-    Q = float(N * (N + 2) * np.sum(rho[used] ** 2 / np.maximum(N - np.arange(1, m + 1)[used], 1)))
-    negative = np.flatnonzero(rho <= 0)
-    positive = rho[: negative[0]] if len(negative) else rho
-    frequency, density = welch(grid[: place[-1] + 1], fs=rate, nperseg=min(SEGMENT, place[-1] + 1), detrend=False)
+    steps = np.rint(np.diff(joint.t) * rate).astype(np.intp)
+    apart = (steps <= 0) | (steps > SEPARATE)  # other records: time goes back, or much later
+    place = np.concatenate([[0], np.cumsum(np.where(apart, m + 1, steps))])  # on a grid of period 1/rate
+    products, pairs = _lagged(error, place, np.flatnonzero(apart) + 1)
+    rho, pairs = correlation(products, pairs), pairs[1 : m + 1]
+    first, used = rho[:m], pairs > 0
+    Q = float(N * (N + 2) * np.sum(first[: len(pairs)][used] ** 2 / np.maximum(N - np.flatnonzero(used) - 1, 1)))
+    grid = np.zeros(place[-1] + 1)
+    grid[place] = error
+    frequency, density = welch(grid, fs=rate, nperseg=min(SEGMENT, len(grid)), detrend=False)
     power = np.cumsum(density)
     return Whiteness(
         joint=joint.joint,
         rows=N,
-        correlation=rho,
+        correlation=first,
         Q=Q,
         p=float(chdtrc(int(used.sum()), Q)),
-        effective_rows=float(N / (1 + 2 * positive.sum())),
+        effective_rows=N / correlation_time(rho),
         frequency=frequency,
         density=density,
         peak=float(frequency[int(np.argmax(density))]),
@@ -92,12 +110,38 @@ def joint_whiteness(joint: JointComparison, rate: float, lags: int = LAGS) -> Wh
     )
 
 
-def effective_share(found: Sequence[Whiteness]) -> float:
+def residual_correlation(residual: Array) -> Array:
+    """rho_k, k = 1 ... N - 1, of residuals, shape (N,), at even distances."""
+    return correlation(*_lagged(residual - residual.mean(), np.arange(len(residual)), np.empty(0, dtype=np.intp)))
+
+
+def correlation(products: Array, pairs: Array) -> Array:
+    """rho_k, k = 1, 2 ..., from sums of products at distances k = 0, 1 ... and the numbers of their pairs; 0 where there is no pair."""
+    if not products[0] > 0:
+        return np.zeros(len(products) - 1)
+    return np.asarray(products[1:] / np.maximum(pairs[1:], 1) / (products[0] / pairs[0]))
+
+
+def correlation_time(rho: Array) -> float:
+    """1 + 2 sum of rho_k, k = 1, 2 ..., before the first that is not positive, in rows: at least 1."""
+    end = np.flatnonzero(rho <= 0)
+    return float(1 + 2 * rho[: end[0] if len(end) else len(rho)].sum())
+
+
+def effective_share(joints: Sequence[Whiteness]) -> float:
     """Rows that count over rows, all joints together, at most 1."""
-    return min(1.0, sum(w.effective_rows for w in found) / max(sum(w.rows for w in found), 1))
+    return min(1.0, sum(w.effective_rows for w in joints) / max(sum(w.rows for w in joints), 1))
 
 
-def _places(t: Array, rate: float, gap: int) -> Array:
-    """Number of each row on a grid of period 1/rate; time that goes back starts another record, `gap` + 1 places on."""
-    steps = np.rint(np.diff(t) * rate).astype(np.intp)
-    return np.concatenate([[0], np.cumsum(np.where(steps <= 0, gap + 1, steps))])
+def _lagged(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
+    """Sums of x_t x_(t+k), k = 0, 1 ..., and the number of pairs; x, shape (N,), at places on a grid. No pair spans `starts` of other records."""
+    records = np.split(np.arange(len(x)), starts)
+    longest = max(int(place[rows[-1]] - place[rows[0]]) + 1 for rows in records)
+    sums = np.zeros((2, longest))
+    for rows in records:
+        own = place[rows] - place[rows[0]]
+        grid = np.zeros((2, own[-1] + 1))
+        grid[:, own] = x[rows], np.ones(len(rows))
+        spectrum = np.abs(rfft(grid, length := next_fast_len(2 * grid.shape[1], real=True))) ** 2
+        sums[:, : grid.shape[1]] += irfft(spectrum, length)[:, : grid.shape[1]]
+    return sums[0], np.rint(sums[1])

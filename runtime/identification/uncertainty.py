@@ -21,15 +21,13 @@ from typing import Any
 import numpy as np
 from scipy.special import fdtrc
 
-from runtime.estimators import linear_companion, linear_system
-from runtime.estimators.block_covariance import block_of_rows
+from runtime.estimators.block_covariance import drawn_again
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.linear import System, whitened
+from runtime.estimators.methods import linear_companion, linear_system
 from runtime.identification.residuals import SIGNIFICANT, Whiteness, effective_share, whiteness
 from runtime.identification.validation import Comparison
-from runtime.observation.observation import Observation
-from runtime.observation.reduction import Reduction
+from runtime.observation.system import Observation
 from runtime.settings.study import EstimateSettings
 from runtime.table import aligned
 
@@ -41,7 +39,7 @@ SEED = 1
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class BlockBootstrap:
     """Deviations of the essential parameters three ways, shape (b,) each: eq. (10), corrected for correlation, drawn again by blocks."""
 
     names: tuple[str, ...]
@@ -79,10 +77,10 @@ class FTest:
 
 
 @dataclass(frozen=True, eq=False)
-class Trust:
+class Uncertainty:
     """Checks of one identification. sets : by threshold, count and the names that differ from the set used ("-": removed besides, "+": kept besides)."""
 
-    scatter: Scatter
+    bootstrap: BlockBootstrap
     whiteness: tuple[Whiteness, ...]
     f_tests: tuple[FTest, ...]
     sets: tuple[tuple[float, int, tuple[str, ...]], ...]
@@ -99,14 +97,14 @@ class Trust:
     @property
     def verdict(self) -> tuple[str, ...]:
         """One sentence for each check."""
-        ratio = self.scatter.ratio[np.isfinite(self.scatter.ratio)]
+        ratio = self.bootstrap.ratio[np.isfinite(self.bootstrap.ratio)]
         spread = f"from {ratio.min():.1f} to {ratio.max():.1f}, median {np.median(ratio):.1f}" if len(ratio) else "unknown"
         coloured = [w.joint for w in self.whiteness if not w.white]
         white = f"not white on joint {', '.join(coloured)}" if coloured else "white on every joint"
         share = 100 * effective_share(self.whiteness)
         kept = self.all_count - sum(test.removed for test in self.f_tests)
         return (
-            f"Deviations by blocks drawn again are {spread} times sigma (10): {self.scatter.blocks} blocks of {self.scatter.length:.3g} s, {self.scatter.runs} draws.",
+            f"Deviations by blocks drawn again are {spread} times sigma (10): {self.bootstrap.blocks} blocks of {self.bootstrap.length:.3g} s, {self.bootstrap.runs} draws.",
             f"Residuals are {white} (Ljung-Box, 5 %); the rows are worth {share:.0f} % of their number.",
             f"The threshold keeps {kept} parameters, an F-test at 5 % on the rows that count keeps {self.kept_by_f_test}.",
         )
@@ -117,12 +115,14 @@ class Trust:
 
     def to_text(self) -> str:
         """Sentences, deviations and whiteness."""
-        return "\n\n".join(["\n".join(self.verdict), aligned(self.scatter_lines()), aligned(self.whiteness_lines())])
+        return "\n\n".join(["\n".join(self.verdict), aligned(self.bootstrap_lines()), aligned(self.whiteness_lines())])
 
-    def scatter_lines(self) -> list[Sequence[str]]:
+    def bootstrap_lines(self) -> list[Sequence[str]]:
         """Deviations, header first."""
         lines: list[Sequence[str]] = [("parameter", "sigma (10)", "corrected", "drawn", "drawn / (10)")]
-        for row in zip(self.scatter.names, self.scatter.sigma, self.scatter.corrected, self.scatter.drawn, self.scatter.ratio, strict=True):
+        for row in zip(
+            self.bootstrap.names, self.bootstrap.sigma, self.bootstrap.corrected, self.bootstrap.drawn, self.bootstrap.ratio, strict=True
+        ):
             lines.append((row[0], *(f"{x:.3g}" for x in row[1:4]), f"{row[4]:.2f}"))
         return lines
 
@@ -161,7 +161,7 @@ class Trust:
         """For JSON."""
         return {
             "verdict": self.verdict,
-            "scatter": {**vars(self.scatter), "ratio": self.scatter.ratio},
+            "scatter": {**vars(self.bootstrap), "ratio": self.bootstrap.ratio},
             "whiteness": [{**vars(w), "white": w.white} for w in self.whiteness],
             "f_tests": self.f_tests,
             "kept_by_f_test": self.kept_by_f_test,
@@ -169,53 +169,41 @@ class Trust:
         }
 
 
-def trust(observation: Observation | Reduction, settings: EstimateSettings, essential: Essential, comparison: Comparison) -> Trust:
-    """Checks of the essential parameters found on `observation` by the linear method of `settings`, or the companion of one that is not linear.
+def uncertainty(observation: Observation, settings: EstimateSettings, essential: Essential, comparison: Comparison) -> Uncertainty:
+    """Checks of the essential parameters of an observation.
 
-    comparison : the residuals that are judged.
+    Parameters
+    ----------
+    observation : Observation
+        Rows that gave them.
+    settings : EstimateSettings
+        Method of the study; the checks are those of its linear companion.
+    essential : Essential
+        Parameters, and the trail to them.
+    comparison : Comparison
+        Residuals whose whiteness is tested.
     """
-    seen = whiteness(comparison, observation.rate)
-    return Trust(
-        scatter=scatter(observation, settings, essential.estimate),
-        whiteness=seen,
-        f_tests=f_tests(essential, effective_share(seen)),
+    by_joint = whiteness(comparison, observation.rate)
+    return Uncertainty(
+        bootstrap=block_bootstrap(observation, settings, essential.estimate),
+        whiteness=by_joint,
+        f_tests=f_tests(essential, effective_share(by_joint)),
         sets=sets(essential),
         all_count=len(essential.all_parameters.names),
     )
 
 
-def scatter(
-    observation: Observation | Reduction, settings: EstimateSettings, fit: Estimate, *, runs: int = RUNS, seed: int = SEED
-) -> Scatter:
+def block_bootstrap(
+    observation: Observation, settings: EstimateSettings, fit: Estimate, *, runs: int = RUNS, seed: int = SEED
+) -> BlockBootstrap:
     """Deviations of `fit` by `runs` draws of its blocks of residuals; weights stay."""
     system = linear_system(observation, linear_companion(settings)).select(fit.names)
     length = float(fit.settings["residual_block"])
-    grams = block_grams(system, length)
-    K = len(grams)
+    blocks = list(observation.block_rows(fit.names, 1 / np.array(system.scales), length, system.whitener))
     drawn = np.full(len(fit.names), np.nan)
-    if K > 1 and fit.status == "ok":
-        counts = np.random.default_rng(seed).multinomial(K, np.full(K, 1 / K), size=runs)
-        drawn = np.std([_solved(np.tensordot(count, grams, axes=1)) for count in counts.astype(float)], axis=0, ddof=1)
-    return Scatter(fit.names, fit.sigma, fit.sigma_corrected, drawn, K, length, runs, seed)
-
-
-def block_grams(system: System, length: float) -> Array:
-    """Gram matrix of the weighted [W Y] of every block of residuals, shape (K, b + 1, b + 1)."""
-    observation = system.observation.columns(system.names)
-    b = len(system.names)
-    weights = 1 / np.array(system.scales)
-    if isinstance(observation, Reduction):
-        found: dict[tuple[int, int], Array] = {}
-        for segment in observation.segments:
-            gram = found.setdefault((segment.record, segment.block), np.zeros((b + 1, b + 1)))
-            for joint, weight in zip(segment.joints, weights, strict=True):
-                columns = [*joint.columns, b]
-                gram[np.ix_(columns, columns)] += weight**2 * joint.R.T @ joint.R
-        return np.array([gram for gram in found.values() if gram.any()])
-    A = np.column_stack([observation.W, observation.Y])
-    A = whitened(A, system.whitener) if system.whitener is not None else A * np.repeat(weights, observation.rows)[:, None]
-    blocks = block_of_rows(observation, length)
-    return np.array([A[blocks == k].T @ A[blocks == k] for k in range(int(blocks.max()) + 1)])
+    if len(blocks) > 1 and fit.status == "ok":
+        drawn = np.std(drawn_again(blocks, _solved, runs, seed), axis=0, ddof=1)
+    return BlockBootstrap(fit.names, fit.sigma, fit.sigma_corrected, drawn, len(blocks), length, runs, seed)
 
 
 def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:

@@ -10,19 +10,20 @@ Errors are reported per joint since a wrong wrist hides in a total that the shou
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from runtime.errors import InputError
-from runtime.estimators import estimate, linear_companion, linear_system, point_estimate
-from runtime.estimators.estimate import Estimate, json_text
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import estimate_of, linear_companion, linear_system, point_estimate
 from runtime.estimators.solution import unit_columns
+from runtime.json_documents import json_text
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation
-from runtime.observation.reduction import Reduction, Window
+from runtime.observation.segments import Window
+from runtime.observation.system import Observation
 from runtime.settings.study import EstimateSettings
 from runtime.table import aligned
 
@@ -128,19 +129,15 @@ class CrossValidation:
         return {"schema": 1, "joints": self.joints, "predictions": self.predictions}
 
 
-def prediction_errors(observation: Observation | Reduction, fit: Estimate) -> tuple[float, tuple[float, ...]]:
+def prediction_errors(observation: Observation, fit: Estimate) -> tuple[float, tuple[float, ...]]:
     """100 ||Y - W X|| / ||Y||, in %, over all joints and by joint."""
-    if isinstance(observation, Observation):
-        compared = direct_comparison(observation, fit)
-        return compared.relative_error, tuple(joint.relative_error for joint in compared)
-    joints = observation.columns(fit.names).factor.joints
-    errors, measured = (np.array(x) for x in ([j.residual_norm(fit.X) for j in joints], [j.measured_norm for j in joints]))
-    return _percent(errors, measured), tuple(_percent(e, m) for e, m in zip(errors, measured, strict=True))
+    residual, measured = observation.norms(fit.names, fit.X)
+    return _percent(residual, measured), tuple(_percent(e, m) for e, m in zip(residual, measured, strict=True))
 
 
 def cross_validation(
-    fit: Observation | Reduction,
-    predict: Mapping[str, Observation | Reduction],
+    fit: Observation,
+    predict: Mapping[str, Observation],
     settings: EstimateSettings | None = None,
     *,
     essential: Sequence[str] | None = None,
@@ -152,21 +149,20 @@ def cross_validation(
     predict : observations by label; essential : names found before, on the whole record or on the fitted part.   model : for methods that need it.
     """
     settings = point_estimate(settings or EstimateSettings())
-    every = fit.names if settings.columns == "all" else settings.columns
-    choices = {"all": tuple(every)} | ({} if essential is None else {"essential": tuple(essential)})
+    choices = {"all": settings.columns} | ({} if essential is None else {"essential": tuple(essential)})
     predictions = []
     labels: tuple[str, ...] = ()
     for columns, names in choices.items():
-        found = estimate(fit.columns(names), EstimateSettings(settings.method, settings.weights, "all", settings.options), model=model)
-        for part, seen in {name: fit, **predict}.items():
-            labels = tuple(joint.joint for joint in found.per_joint)
-            total, errors = prediction_errors(seen, found)
-            predictions.append(Prediction(part, columns, len(names), seen is fit, total, errors))
+        found = estimate_of(fit, replace(settings, columns=names), model=model)
+        labels = tuple(joint.joint for joint in found.per_joint)
+        for part, observation in {name: fit, **predict}.items():
+            total, errors = prediction_errors(observation, found)
+            predictions.append(Prediction(part, columns, len(found.names), observation is fit, total, errors))
     return CrossValidation(labels, tuple(predictions))
 
 
 def split_validation(
-    observation: Observation | Reduction,
+    observation: Observation,
     windows: Sequence[Window],
     settings: EstimateSettings | None = None,
     *,
@@ -246,7 +242,7 @@ class WeakDirections:
 
 
 def weak_directions(
-    observation: Observation | Reduction, settings: EstimateSettings | None = None, *, threshold: float = CORRELATION, count: int = 3
+    observation: Observation, settings: EstimateSettings | None = None, *, threshold: float = CORRELATION, count: int = 3
 ) -> WeakDirections:
     """Parameters that trade against each other on this observation.
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol, cast
 
-from runtime.errors import ModelError
-from runtime.model.generated import GeneratedModel, sibling_file
+from runtime.errors import InputError, ModelError
+from runtime.model.generated import GeneratedModel, file_of
 from runtime.model.loading import module_of
 
 CONSTANTS = ("NAME", "JOINTS", "BASE_PARAMETERS", "CONSTANTS", "LIMITS", "VALUES", "SOURCE_SHA256")
@@ -45,14 +45,39 @@ class SymbolicModel(Protocol):
     forward_dynamics: Callable[..., Any]  # qdd of q, qd, tau, X
 
 
-def load_symbolic(model: str | Path | ModuleType, *, of: GeneratedModel | None = None, folder: Path | None = None) -> SymbolicModel:
-    """The CasADi model of a name (generated/NAME_casadi.py), of a path, or of an imported module; ModelError where it is no such model.
+def load_symbolic(
+    model: str | Path | ModuleType | SymbolicModel, *, of: GeneratedModel | None = None, folder: str | Path | None = None
+) -> SymbolicModel:
+    """The CasADi model of a name (generated/NAME_casadi.py), of a path, or of an imported module.
 
-    of : the NumPy model that it must belong to.   folder : where names are looked up; default: ./generated.
+    Parameters
+    ----------
+    model : str, Path or module
+    of : GeneratedModel, optional
+        The NumPy model that it must belong to.
+    folder : str or Path, optional
+        Where names are looked up; default: ./generated.
+
+    Raises
+    ------
+    ModelError
+        No such file, or no such model.
     """
-    if isinstance(model, ModuleType):
-        return _checked(model, of)
-    return _checked(module_of(sibling_file(model, "casadi", title="CasADi", folder=folder)), of)
+    if not isinstance(model, str | Path):
+        return _checked(cast(ModuleType, model), of)
+    path = file_of(model, "_casadi", folder)
+    if not path.is_file():
+        robot = path.stem.removesuffix("_casadi")
+        raise ModelError(f"no CasADi model {path}; emit it with `symgen generate {robot} --target numpy,casadi -o {path.parent}`")
+    return _checked(module_of(path), of)
+
+
+def casadi_path(model: GeneratedModel) -> Path:
+    """The CasADi file in the folder of the NumPy module; InputError for a model that has no file."""
+    file = getattr(model, "__file__", None)
+    if file is None:
+        raise InputError(f"{model.NAME} has no file to look beside for its CasADi module; pass it as `symbolic`")
+    return Path(file).with_name(f"{model.NAME}_casadi.py")
 
 
 def _checked(module: ModuleType, of: GeneratedModel | None) -> SymbolicModel:

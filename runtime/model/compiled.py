@@ -70,7 +70,7 @@ def target_of(model: GeneratedModel) -> str:
 
 
 @dataclass(frozen=True)
-class Signals:
+class SignalTable:
     """The distinct rows of the store S, shape (b, n, N), as a C function, for other C code: S[column, row] = sign U[signal].
 
     address : of int32_t f(int64_t m, const double *q, const double *qd, const double *qdd, int64_t stride, const double *constants,
@@ -225,7 +225,7 @@ def text_of(model: GeneratedModel) -> ModelText:
     return CompiledText(module.name, module.text, module.digest, model.source) if isinstance(model, CompiledModel) else module
 
 
-def _signals(library: ctypes.CDLL, model: GeneratedModel) -> Signals:
+def _signals(library: ctypes.CDLL, model: GeneratedModel) -> SignalTable:
     tile, count, entries = (
         ctypes.c_int32.in_dll(library, f"{model.NAME}_{name}").value for name in ("tile", "signal_count", "entry_count")
     )
@@ -233,7 +233,7 @@ def _signals(library: ctypes.CDLL, model: GeneratedModel) -> Signals:
     column, row = np.divmod(place, len(model.JOINTS))
     address = ctypes.cast(getattr(library, f"{model.NAME}_signals"), ctypes.c_void_p).value
     constant = np.arange(entries) >= ctypes.c_int32.in_dll(library, f"{model.NAME}_varying_count").value
-    return Signals(cast(int, address), count, tile, column, row, signal, sign, constant)
+    return SignalTable(cast(int, address), count, tile, column, row, signal, sign, constant)
 
 
 def _large() -> int:

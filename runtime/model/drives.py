@@ -27,10 +27,14 @@ class Drives:
 
     Parameters
     ----------
-    ratio : ndarray, shape (n, n), R; motor turns per joint turn, rad/rad (rad/m for a prismatic joint), signs included.
-    offset : ndarray, shape (n,), joint position where the motor reads zero, rad or m.
-    torque_constant : ndarray, shape (n,), motor torque per unit of u, N m/A (or N m/V); 1 where u is a torque.
-    coupling : where the off-diagonal elements of R count.
+    ratio : ndarray, shape (n, n), rad/rad, or rad/m for a prismatic joint
+        R, motor turns per joint turn, signs included.
+    offset : ndarray, shape (n,), rad or m
+        Joint position where the motor reads zero.
+    torque_constant : ndarray, shape (n,), N m/A or N m/V
+        Motor torque per unit of u; 1 where u is a torque.
+    coupling : "both", "position", "torque" or "none"
+        Where the off-diagonal elements of R count.
     """
 
     ratio: Array

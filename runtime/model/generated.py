@@ -52,22 +52,36 @@ class GeneratedModel(Protocol):
         """W, shape (n*N, b), rows joint-major, Fortran order, eq. (6)."""
 
 
-def load_model(model: str | Path | ModuleType, *, folder: Path | None = None) -> GeneratedModel:
-    """The model of a name (generated/NAME.py), of a path to a .py file, or of an imported module, checked before use.
+def load_model(model: str | Path | ModuleType, *, folder: str | Path | None = None) -> GeneratedModel:
+    """The emitted model of a name (generated/NAME.py), of a path to a .py file, or of an imported module, checked before use.
 
-    folder : where names are looked up; default: ./generated.
+    Parameters
+    ----------
+    model : str, Path or module
+    folder : str or Path, optional
+        Where names are looked up; default: ./generated.
+
+    Raises
+    ------
+    ModelError
+        No such file, a file that no emitter writes, or no such model.
     """
     if isinstance(model, ModuleType):
         return checked_model(model)
-    path = Path(model)
-    if isinstance(model, str) and re.fullmatch(r"\w+", model):
-        path = (folder or FOLDER) / f"{model}.py"
+    path = file_of(model, "", folder)
     if not path.is_file():
         present = sorted(p.stem for p in path.parent.glob("*.py") if p.stem != "__init__") if path.parent.is_dir() else []
         raise ModelError(
             f"no emitted model {path}; {path.parent} holds {', '.join(present) or 'none'}: emit it with `symgen generate {path.stem}`"
         )
     return checked_model(module_of(path))
+
+
+def file_of(model: str | Path, ending: str, folder: str | Path | None) -> Path:
+    """The file of a path, or of a name: FOLDER/NAME.py, NAME with the ending of its target."""
+    if isinstance(model, str) and re.fullmatch(r"\w+", model):
+        return Path(folder or FOLDER) / f"{model.removesuffix(ending)}{ending}.py"
+    return Path(model)
 
 
 @dataclass(frozen=True)
@@ -128,17 +142,6 @@ def checked_model(module: ModuleType) -> GeneratedModel:
         raise ModelError(f"DRIVES of {len(model.DRIVES['ratio'])} joints; expected {n}", file=label)
     _check_store(model, b, n, label)
     return model
-
-
-def sibling_file(model: str | Path, target: str, *, title: str, folder: Path | None = None) -> Path:
-    """The module of another target: of a name, FOLDER/NAME_target.py, or of a path; ModelError, which says how to emit it, where there is none."""
-    path, ending = Path(model), f"_{target}"
-    if isinstance(model, str) and re.fullmatch(r"\w+", model):
-        path = (folder or FOLDER) / f"{model.removesuffix(ending)}{ending}.py"
-    if not path.is_file():
-        robot = path.stem.removesuffix(ending)
-        raise ModelError(f"no {title} model {path}; emit it with `symgen generate {robot} --target numpy,{target} -o {path.parent}`")
-    return path
 
 
 def require(model: GeneratedModel, *functions: str) -> None:

@@ -1,4 +1,4 @@
-"""Which parameters a physical robot can have: every link has a mass density, actuators have inertia, friction takes power.
+"""Conditions on the standard parameters of a physical robot: every link has a mass density, actuators have inertia, friction takes power.
 
 Base parameters are X = K chi, chi the standard parameters. Of link j, with J the inertia tensor about the origin of its frame (the elements XX .. ZZ
 as they are) and l = (MX, MY, MZ), the pseudo-inertia
@@ -34,7 +34,16 @@ FORMED = ("inertia", "viscous")  # kinds whose forms must be positive semidefini
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """The matrix sum_k chi[numbers[k]] B[k] is positive semidefinite; numbers count the standard parameters, B has shape (k, m, m)."""
+    """The matrix sum_k chi[numbers[k]] B[k] is positive semidefinite.
+
+    Attributes
+    ----------
+    name : str
+        Link, form or element that the condition is about.
+    numbers : tuple of int
+        Standard parameters, by their place.
+    B : ndarray, shape (k, m, m)
+    """
 
     name: str
     numbers: tuple[int, ...]
@@ -51,10 +60,20 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class PhysicalModel:
-    """What a model says about its standard parameters.
+    """Standard parameters of a model: their map to base parameters and the conditions on them.
 
-    standard, base : names, p and b of them.   K : ndarray, shape (b, p), X = K chi.   values : those of the robot file, by name.
-    links : numbers of the links that have inertia.   conditions : one per link, then one per form, then one per signed element.
+    Attributes
+    ----------
+    standard, base : tuple of str
+        Names, p and b of them.
+    K : ndarray, shape (b, p)
+        X = K chi.
+    links : tuple of int
+        Links that have inertia.
+    conditions : tuple of Condition
+        One per link, then one per form, then one per signed element.
+    values : mapping
+        Those of the robot file, by name.
     """
 
     standard: tuple[str, ...]
@@ -84,19 +103,33 @@ class PhysicalModel:
 
 
 def physical_model(model: GeneratedModel, constants: Mapping[str, float] | None = None) -> PhysicalModel:
-    """The conditions of an emitted model. constants : geometry other than that of the robot file, as for `base_parameters`."""
+    """Standard parameters of an emitted model and the conditions on them.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    constants : mapping, optional
+        Values in place of the robot file's, as for `base_parameters`.
+
+    Raises
+    ------
+    ModelError
+        A model of an older version, without these tables.
+    """
     require(model, "base_parameters")
-    missing = [name for name in ("STANDARD_PARAMETERS", "LINKS", "ELEMENTS") if not hasattr(model, name)]
+    needed = ("STANDARD_PARAMETERS", "LINKS", "ELEMENTS", *(["elements"] if constants else []))
+    missing = [name for name in needed if not hasattr(model, name)]
     if missing:
         raise ModelError(f"no {', '.join(missing)}; emit it again with this version of symgen", file=model.NAME)
     emitted = cast(Any, model)
     standard: tuple[str, ...] = tuple(emitted.STANDARD_PARAMETERS)
+    elements = emitted.elements(**constants) if constants else emitted.ELEMENTS
     return PhysicalModel(
         standard=standard,
         base=tuple(model.BASE_PARAMETERS),
         K=np.asarray(emitted.base_parameters(np.eye(len(standard)), **(constants or {})), dtype=float),
         links=tuple(emitted.LINKS),
-        conditions=(*_links(emitted.LINKS, standard), *_forms(emitted.ELEMENTS, standard), *_signs(emitted.ELEMENTS, standard)),
+        conditions=(*_links(emitted.LINKS, standard), *_forms(elements, standard), *_signs(elements, standard)),
         values=dict(model.VALUES),
     )
 

@@ -1,4 +1,4 @@
-"""A tool or load of known inertia on a link, or on a frame fixed to one (sigma 2): its ten parameters in either frame, and what it adds to X.
+"""Effect of a tool or load of known inertia on the base parameters: its ten parameters in the frame it is mounted on and in that of the link.
 
 With P the pseudo-inertia of a body (`runtime.model.inertia`), about and along the axes of frame f, and lTf the pose of f in the frame of its link l,
 
@@ -25,7 +25,17 @@ RIGID = 1e-9  # largest change of a pose, against the size of the robot, of two 
 
 @dataclass(frozen=True, eq=False)
 class Mount:
-    """Where a load is fixed: on link `link`, its parameters meant at frame `frame`, whose pose in the frame of the link is T, shape (4, 4)."""
+    """Where a load is fixed.
+
+    Attributes
+    ----------
+    link : int
+        Link that carries it.
+    frame : int
+        Frame of its parameters: that of the link, or one fixed to it.
+    T : ndarray, shape (4, 4)
+        Pose of the frame in the frame of the link.
+    """
 
     link: int
     frame: int
@@ -55,12 +65,18 @@ def mount(model: GeneratedModel, frame: int | None = None, link: int | None = No
 
     Parameters
     ----------
-    frame : any declared frame; default: that of the link.   link : default: the one that carries the frame, or the last link with inertia.
-    constants : geometry other than that of the robot file, as for `frame_poses`.
+    model : GeneratedModel
+    frame : int, optional
+        Any declared frame; default: that of the link.
+    link : int, optional
+        Default: the one that carries the frame, or the last link with inertia.
+    constants : mapping, optional
+        Values in place of the robot file's, as for `frame_poses`.
 
     Raises
     ------
-    InputError : no such frame or link, or a frame that no link with inertia carries.
+    InputError
+        No such frame or link, or a frame that no link with inertia carries.
     """
     links = physical_model(model).links
     link = links[-1] if link is None and frame is None else link
@@ -74,23 +90,33 @@ def mount(model: GeneratedModel, frame: int | None = None, link: int | None = No
     T: Array = model.frame_poses(rng.uniform(-1.0, 1.0, (8, len(model.JOINTS))), **(constants or {}))  # type: ignore[attr-defined]
     if not 1 <= frame <= T.shape[1]:
         raise InputError(f"no frame {frame}; {model.NAME} has frames 1 to {T.shape[1]}")
-    seen = {j: np.linalg.solve(T[:, j - 1], T[:, frame - 1]) for j in links}
+    poses = {j: np.linalg.solve(T[:, j - 1], T[:, frame - 1]) for j in links}
     size = max(1.0, float(np.abs(T).max()))
-    carrying = [j for j, pose in seen.items() if np.ptp(pose, axis=0).max() < RIGID * size]
+    carrying = [j for j, pose in poses.items() if np.ptp(pose, axis=0).max() < RIGID * size]
     if link is not None and link not in carrying:
         raise InputError(f"frame {frame} is not fixed to link {link}; it is fixed to {_named(carrying)}")
     if not carrying:
         raise InputError(f"frame {frame} is fixed to no link with inertia; links are {', '.join(map(str, links))}")
     link = link or (frame if frame in carrying else carrying[-1])
-    return Mount(link, frame, np.eye(4) if link == frame else seen[link].mean(axis=0))
+    return Mount(link, frame, np.eye(4) if link == frame else poses[link].mean(axis=0))
 
 
 def load_effect(
     model: GeneratedModel, load: Mapping[str, float], *, frame: int | None = None, link: int | None = None, **constants: float
 ) -> Array:
-    """What a known load adds to the base parameters, shape (b,) in the order of BASE_PARAMETERS: X + load_effect(...) is the robot with it.
+    """Change of the base parameters by a known load, shape (b,), in the order of BASE_PARAMETERS: X + load_effect(...) is the robot with it.
 
-    load : of XX XY XZ YY YZ ZZ MX MY MZ M, at frame `frame` (default: that of the link), SI; what is left out is zero.
+    Parameters
+    ----------
+    model : GeneratedModel
+    load : mapping
+        Some of XX XY XZ YY YZ ZZ MX MY MZ M at the frame, SI; what is left out is zero.
+    frame : int, optional
+        Default: that of the link.
+    link : int, optional
+        Default: the one that carries the frame, or the last link with inertia.
+    **constants : float
+        Values in place of the robot file's.
     """
     return np.asarray(mount(model, frame, link, constants).columns(physical_model(model, constants)) @ load_vector(load))
 
@@ -107,9 +133,13 @@ def load_of_body(mass: float, centre: Any, inertia: Any = None, rotation: Any = 
 
     Parameters
     ----------
-    mass : kg.   centre : of mass in that frame, shape (3,), m.
-    inertia : tensor about the centre of mass, shape (3, 3), kg m^2 (products as tensor elements, Ixy = -integral x y dm); default: a point.
-    rotation : orientation of the axes of `inertia` in that frame, shape (3, 3); default: the same axes.
+    mass : float, kg
+    centre : array_like, shape (3,), m
+        Of mass, in that frame.
+    inertia : array_like, shape (3, 3), kg m^2, optional
+        Tensor about the centre of mass (products as tensor elements, Ixy = -integral x y dm); default: a point.
+    rotation : array_like, shape (3, 3), optional
+        Orientation of the axes of `inertia` in that frame; default: the same axes.
     """
     c, I = np.asarray(centre, dtype=float), np.zeros((3, 3)) if inertia is None else np.asarray(inertia, dtype=float)
     R = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)

@@ -14,14 +14,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, cast
 
 import casadi as ca
 import numpy as np
 from scipy.signal import butter, lfilter
 
 from runtime.errors import InputError, SettingsError
-from runtime.model.casadi import SymbolicModel, load_symbolic
+from runtime.model.casadi import SymbolicModel, casadi_path, load_symbolic
 from runtime.model.generated import GeneratedModel
 from runtime.motion.control_law import ControlLaw, continuous_pole, control_law, discrete_poles
 from runtime.motion.controller_tick import LoopInputs, blocks, compiled, tick_function
@@ -63,7 +64,7 @@ class Simulator:
             raise InputError(f"{model.NAME} has no constant {', '.join(unknown)}; there are {', '.join(model.CONSTANTS)}")
         self.model, self.controller, self.constants = model, controller, dict(constants or {})
         self.law: ControlLaw = control_law(controller, model)
-        self.symbolic = symbolic or _beside(model)
+        self.symbolic = symbolic or load_symbolic(casadi_path(model), of=model)
         self.friction: DryFriction = dry_friction(model)
         self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
         self._ticks: dict[int, Any] = {}
@@ -266,7 +267,7 @@ def simulate(
     *,
     records: Sequence[Record] | None = None,
     folder: str | Path | None = None,
-    symbolic: SymbolicModel | None = None,
+    symbolic: str | Path | ModuleType | SymbolicModel | None = None,
     ideal: bool = False,
     name: str | None = None,
 ) -> Simulation:
@@ -282,7 +283,7 @@ def simulate(
         Those of the study; default: read from its files, where the reference is that of a record.
     folder : str or Path, optional
         Where file names of the study start; default: the current folder.
-    symbolic : SymbolicModel, optional
+    symbolic : str, Path or module, optional
         CasADi model of the same robot; default: the file beside that of `model`.
     ideal : bool
         No noise, no steps of encoder and converter.
@@ -305,21 +306,23 @@ def simulate(
     X = parameters_of(model, controller)
     reference = reference_of(controller, model, records=records, folder=folder)
     start = records[index].q[0] if index is not None and controller.start is None else None
-    simulator = Simulator(model, controller, symbolic=symbolic)
+    simulator = Simulator(model, controller, symbolic=None if symbolic is None else load_symbolic(symbolic, of=model))
     return simulator.run(X, reference, ideal=ideal, start=start, name=name or f"{SIMULATED} {model.NAME}")
 
 
-def parameters_of(model: GeneratedModel, controller: Controller) -> Array:
+def parameters_of(model: GeneratedModel, controller: Controller | None = None) -> Array:
     """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in their place; 0 for those without effect."""
-    values = {**dict.fromkeys(model.NO_EFFECT, 0.0), **model.VALUES, **controller.values}  # type: ignore[attr-defined]
-    if missing := [name for name in model.STANDARD_PARAMETERS if name not in values]:  # type: ignore[attr-defined]
-        raise SettingsError(
-            f"{model.NAME} has no value of {', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the robot file or here, 0 where one is zero",
-            path=("controller", "values"),
-        )
-    if unknown := sorted(set(controller.values) - set(values.keys() & set(model.STANDARD_PARAMETERS))):  # type: ignore[attr-defined]
-        raise SettingsError(f"no standard parameter {', '.join(unknown)}", path=("controller", "values"))
-    return np.asarray(model.base_parameters(values), dtype=float)  # type: ignore[attr-defined]
+    changed = {} if controller is None else controller.values
+    emitted, where = cast(Any, model), ("controller", "values")
+    values = {**dict.fromkeys(emitted.NO_EFFECT, 0.0), **model.VALUES, **changed}
+    if missing := [name for name in emitted.STANDARD_PARAMETERS if name not in values]:
+        message = f"{model.NAME} has no value of {', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the robot file"
+        if controller is None:
+            raise InputError(f"{message} (0 where one is zero), or a record whose estimate tells the parameters")
+        raise SettingsError(f"{message} or here, 0 where one is zero", path=where)
+    if unknown := sorted(set(changed) - set(emitted.STANDARD_PARAMETERS)):
+        raise SettingsError(f"no standard parameter {', '.join(unknown)}", path=where)
+    return np.asarray(emitted.base_parameters(values), dtype=float)
 
 
 def inertia_ratio(model: GeneratedModel, X: Array, X_reference: Array, reference: Reference) -> Array:
@@ -327,14 +330,6 @@ def inertia_ratio(model: GeneratedModel, X: Array, X_reference: Array, reference
     inertia_matrix = model.inertia_matrix  # type: ignore[attr-defined]
     J, J_reference = (np.einsum("tjj->j", inertia_matrix(reference.q, x)) for x in (X, X_reference))
     return np.asarray(J / J_reference)
-
-
-def _beside(model: GeneratedModel) -> SymbolicModel:
-    """The CasADi module in the folder of the NumPy module."""
-    file = getattr(model, "__file__", None)
-    if file is None:
-        raise InputError(f"{model.NAME} has no file to look beside for its CasADi module; pass it as `symbolic`")
-    return load_symbolic(Path(file).with_name(f"{model.NAME}_casadi.py"), of=model)
 
 
 def _rest_functions(model: SymbolicModel, constants: Mapping[str, float]) -> Any:

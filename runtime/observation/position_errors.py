@@ -26,9 +26,10 @@ from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.observation.filters import States, filtered_states
 from runtime.observation.noise_gain import Bandwidth, bandwidth
-from runtime.observation.observation import Observation, decimated_torque, observation_from_states
+from runtime.observation.observation import decimated_torque, observation_from_states
 from runtime.observation.rows import Selection, select_rows
 from runtime.observation.sign_errors import Kernels, Switch, Switched, kernels, switched, switches
+from runtime.observation.system import Observation
 from runtime.records.record import Record
 from runtime.settings.study import Study
 

@@ -48,6 +48,12 @@ class JointFactor:
     R: Array
     rows: int
 
+    def spread(self, b: int) -> Array:
+        """R with a column for each of b parameters and for Y, shape (k, b + 1)."""
+        block = np.zeros((len(self.R), b + 1))
+        block[:, [*self.columns, b]] = self.R
+        return block
+
     def residual_norm(self, X: Array) -> float:
         """||Y_j - W_j X|| for X, shape (b,)."""
         return float(np.linalg.norm(self.R[:, :-1] @ X[self.columns] - self.R[:, -1]))
@@ -129,12 +135,7 @@ def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
 
 def stacked(joints: Sequence[JointFactor], b: int) -> Array:
     """R, shape (b + 1, b + 1), of the stacked factors of all joints."""
-    blocks = []
-    for joint in joints:
-        block = np.zeros((len(joint.R), b + 1))
-        block[:, [*joint.columns, b]] = joint.R
-        blocks.append(block)
-    return triangularise(np.vstack(blocks)) if blocks else np.zeros((b + 1, b + 1))
+    return triangularise(np.vstack([joint.spread(b) for joint in joints])) if joints else np.zeros((b + 1, b + 1))
 
 
 def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Factor:

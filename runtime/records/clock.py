@@ -1,4 +1,7 @@
-"""The clock of a record: increasing, uniform within the jitter allowed, and at the rate that the settings state. Time is read by blocks, twice."""
+"""The clock of a record: stamps that increase, uniform within the jitter allowed, at the rate that is stated.
+
+Stamps are read by blocks, twice: for their order and mean rate, then against the uniform grid of that rate.
+"""
 
 from __future__ import annotations
 
@@ -8,78 +11,118 @@ from dataclasses import dataclass
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.records.formats.table import Table
-from runtime.records.joint_side import finite_columns
-from runtime.settings.record import RecordSettings
-from runtime.settings.units import time_unit
+from runtime.records.time_stamps import TimeStamps, time_stamps
 
 Array = np.ndarray
 
-RATE_TOLERANCE = 1e-3  # between the rate of the settings and that of the time column
+JITTER = 0.1  # sampling periods that stamps may be off the uniform grid where nothing is said
+RATE_TOLERANCE = 1e-3  # between a stated rate and that of the stamps, beyond what the jitter of the two ends makes
+
+
+def sample(i: int) -> str:
+    """The place of sample i, from 0, of arrays."""
+    return f"sample {i + 1}"
 
 
 @dataclass(frozen=True)
-class Clock:
-    """Number of samples and sampling rate, Hz."""
+class Stamps:
+    """Time stamps of one record and how messages name them.
 
-    samples: int
-    rate: float
+    Attributes
+    ----------
+    file : str
+        Name of the file or of the record.
+    column : str or None
+        Name of the column.
+    row : callable
+        Place of sample i, from 0, in words.
+    rate : float or None
+        Stated rate, Hz.
+    jitter : float
+        Largest deviation from a uniform grid, sampling periods.
+    """
+
+    file: str
+    column: str | None = None
+    row: Callable[[int], str] = sample
+    rate: float | None = None
+    jitter: float = JITTER
+
+    def error(self, message: str, i: int | None = None) -> InputError:
+        """The error of sample i, or of all."""
+        return InputError(message, file=self.file, column=self.column, row=None if i is None else self.row(i))
 
 
-def clock(settings: RecordSettings, tables: Callable[[], Iterable[Table]], name: str) -> Clock:
-    """The clock of the time column called `name`; tables : the blocks of the file, as often as asked."""
+def clock(stamps: Stamps, blocks: Callable[[], Iterable[Array]]) -> float:
+    """Sampling rate, Hz: the stated one where there is one.
+
+    Parameters
+    ----------
+    blocks : callable
+        Consecutive stamps, s, as often as asked.
+
+    Raises
+    ------
+    InputError
+        Time that goes back or stands, another rate than the stated one, or stamps off the uniform grid.
+    """
     first = last = np.nan
-    N, file = 0, ""
-    for table, t, step in _times(settings, tables(), name):
+    N = 0
+    for t, step in _steps(blocks()):
         if (step <= 0).any():
             i = int(np.argmax(step <= 0))
-            after = t[i + len(t) - len(step)]
-            raise InputError(
-                f"time goes from {after - step[i]:g} s to {after:g} s; expected increasing time",
-                file=table.file,
-                column=name,
-                row=table.row(i + len(t) - len(step)),
-            )
+            after = i + len(t) - len(step)
+            raise stamps.error(f"time goes from {t[after] - step[i]:g} s to {t[after]:g} s; expected increasing time", N + after)
         first, last, N = (float(t[0]) if N == 0 else first), float(t[-1]), N + len(t)
-        file = table.file
     if N < 2:
-        raise InputError(f"{N} samples; a record needs more", file=file)
+        raise InputError(f"{N} samples; a record needs more", file=stamps.file)
     rate = (N - 1) / (last - first)
-    if settings.rate is not None and abs(rate / settings.rate - 1) > RATE_TOLERANCE:
-        raise InputError(
-            f"time runs at {rate:g} Hz, record.rate is {settings.rate:g} Hz; correct one, or the unit of time", file=file, column=name
-        )
-    _require_uniform(settings, tables(), name, first, rate)
-    return Clock(N, settings.rate or rate)
+    if stamps.rate is not None and abs(rate / stamps.rate - 1) > RATE_TOLERANCE + 2 * stamps.jitter / (N - 1):
+        raise stamps.error(f"time runs at {rate:g} Hz, record.rate is {stamps.rate:g} Hz; correct one, or the unit of time")
+    _require_uniform(stamps, blocks(), first, rate)
+    return stamps.rate or rate
 
 
-def _require_uniform(settings: RecordSettings, tables: Iterable[Table], name: str, first: float, rate: float) -> None:
-    """Raise InputError where time leaves the uniform grid by more than the jitter, at the step that differs most."""
+def rate_of(stamps: Stamps, t: Array) -> float:
+    """Sampling rate, Hz, of the stamps t, shape (N,), s, as `clock`; the error lists every irregularity and the setting that cures them."""
+    try:
+        return clock(stamps, lambda: [t])
+    except InputError as e:
+        if not (np.diff(t) > 0).any():
+            raise
+        regularity = time_stamps(t, file=stamps.file)
+        cure = "" if regularity.regular and regularity.jitter <= stamps.jitter else f". record.resample: {_cure(regularity)}"
+        raise InputError(f"{e.message}. In all: {regularity.to_text(stamps.row)}{cure}", file=e.file, column=e.column, row=e.row) from None
+
+
+def _require_uniform(stamps: Stamps, blocks: Iterable[Array], first: float, rate: float) -> None:
+    """Raise InputError where stamps leave the uniform grid by more than the jitter, at the step that differs most."""
     deviation = worst = 0.0
-    place: tuple[str, str, float] | None = None
-    N = 0
-    for table, t, step in _times(settings, tables, name):
+    N = place = 0
+    length = np.nan
+    for t, step in _steps(blocks):
         deviation = max(deviation, float(np.max(np.abs(t - first - np.arange(N, N + len(t)) / rate) * rate)))
         off = np.abs(step * rate - 1)
         if len(off) and off.max() > worst:
             i = int(np.argmax(off))
-            worst, place = float(off[i]), (table.file, table.row(i + len(t) - len(step)), float(step[i]))
+            worst, place, length = float(off[i]), N + i + len(t) - len(step), float(step[i])
         N += len(t)
-    if deviation > settings.jitter and place is not None:
-        file, row, step_here = place
-        raise InputError(
-            f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step {step_here:g} s here, {1 / rate:g} s on average; "
+    if deviation > stamps.jitter:
+        raise stamps.error(
+            f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step {length:g} s here, {1 / rate:g} s on average; "
             "where the clock alone is at fault, state record.rate without columns.t, or raise record.jitter (below 0.5)",
-            file=file,
-            column=name,
-            row=row,
+            place,
         )
 
 
-def _times(settings: RecordSettings, tables: Iterable[Table], name: str) -> Iterator[tuple[Table, Array, Array]]:
-    """Table, time in s, and the steps that end in it, by block."""
+def _steps(blocks: Iterable[Array]) -> Iterator[tuple[Array, Array]]:
+    """Stamps, s, and the steps that end in them, by block."""
     before: list[float] = []
-    for table in tables:
-        t = finite_columns(table, [name])[:, 0] * time_unit(settings.units.t)
-        yield table, t, np.diff(np.concatenate([before, t]))
+    for t in blocks:
+        yield t, np.diff(np.concatenate([before, t]))
         before = [float(t[-1])]
+
+
+def _cure(regularity: TimeStamps) -> str:
+    cut, cuts = ("{gaps: split}", "cuts there and ") if regularity.gaps or regularity.resets else ("{}", "")
+    return f"{cut} {cuts}interpolates at the stamps, with method: count it takes the samples as uniform"

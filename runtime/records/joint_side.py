@@ -13,12 +13,10 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.model.drives import Drives
-from runtime.records.formats.joint_states import JointTable
-from runtime.records.formats.table import Named, Table
+from runtime.records.formats.columns import Array, Table
+from runtime.records.formats.joint_states import joint_columns
 from runtime.settings.record import Columns, RecordSettings
 from runtime.settings.units import COMMANDS, position_unit, torque_unit
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,27 +54,27 @@ def conversion(settings: RecordSettings, drives: Drives | None, first: Table, la
     return Conversion(positions, scale * constant if of_torques is None else scale, of_positions, of_torques)
 
 
-def column_names(settings: RecordSettings, first: Named, last: Named) -> Columns:
+def column_names(settings: RecordSettings, first: Table, last: Table) -> Columns:
     """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag: the joints of its messages."""
     given = settings.columns
     t = given.t if given.t is not None or settings.rate is not None or "t" not in first.names else "t"
     qr = given.qr or (_numbered("qr", first) if "qr1" in first.names else ())
-    if isinstance(first, JointTable) and settings.units.t != "s":
+    if first.joints is not None and settings.units.t != "s":
         raise InputError(f"record.units.t is {settings.units.t}; time stamps of bags are read in s", file=first.file)
     of_q = _meant(first, "q", "position", given.q)
-    of_tau = _meant(last, "tau", "effort", given.tau or (given.q if isinstance(last, JointTable) else ()))
+    of_tau = _meant(last, "tau", "effort", given.tau or (given.q if last.joints is not None else ()))
     if not {*of_q} <= {*first.names} and {*of_q} <= {*last.names} and {*of_tau} <= {*first.names}:
         raise InputError(f"{first.file} holds the torques and {last.file} the positions; `files` are the positions, then the torques")
     return Columns(t, of_q, of_tau, qr)
 
 
-def _meant(table: Named, key: str, quantity: str, names: Sequence[str]) -> tuple[str, ...]:
-    if isinstance(table, JointTable):
-        return table.columns(quantity, names)
+def _meant(table: Table, key: str, quantity: str, names: Sequence[str]) -> tuple[str, ...]:
+    if table.joints is not None:
+        return joint_columns(table, quantity, names)
     return tuple(names) or _numbered(key, table)
 
 
-def require_alike(names: Columns, first: Named, last: Named, q: tuple[int, ...], tau: tuple[int, ...]) -> None:
+def require_alike(names: Columns, first: Table, last: Table, q: tuple[int, ...], tau: tuple[int, ...]) -> None:
     """Raise InputError where positions and torques, of these shapes, are not of one record."""
     if first is not last and not set(names.q) & set(names.tau) and {*names.tau} <= {*first.names} and {*names.q} <= {*last.names}:
         raise InputError(
@@ -92,17 +90,7 @@ def require_alike(names: Columns, first: Named, last: Named, q: tuple[int, ...],
         raise InputError(f"{q[0]} samples of positions in {first.file}, {tau[0]} of torques in {last.file}; cut them to the same instants")
 
 
-def reference_columns(table: Table, names: Sequence[str], n: int) -> Array | None:
-    """Reference positions as the file holds them, where it does."""
-    if not names:
-        return None
-    q_r = finite_columns(table, names)
-    if q_r.shape[1] != n:
-        raise InputError(f"{q_r.shape[1]} reference positions {', '.join(names)}; expected {n}", file=table.file)
-    return q_r
-
-
-def _numbered(quantity: str, table: Named) -> tuple[str, ...]:
+def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
     found = sorted((int(m[1]), name) for name in table.names if (m := re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name)))
     if not found:
         raise InputError(
@@ -112,9 +100,8 @@ def _numbered(quantity: str, table: Named) -> tuple[str, ...]:
     return tuple(name for _, name in found)
 
 
-def finite_columns(table: Table, names: Sequence[str]) -> Array:
-    """The columns, shape (N, k), without nan or infinity."""
-    x = table.stack(names)
+def require_finite(x: Array, names: Sequence[str], table: Table, first: int = 0) -> Array:
+    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity among them."""
     bad = np.argwhere(~np.isfinite(x))
     if len(bad):
         i, j = bad[0]
@@ -123,7 +110,7 @@ def finite_columns(table: Table, names: Sequence[str]) -> Array:
             f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut the record",
             file=table.file,
             column=column,
-            row=table.row(i),
+            row=table.row(first + int(i)),
         )
     return x
 

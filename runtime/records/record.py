@@ -1,66 +1,102 @@
 """A measured record: time, joint positions and joint torques, joint side, SI, uniformly sampled.
 
-Reading one from files is `runtime.records.reading`; a record made in Python is checked alike.
+`runtime.records.reading` makes records of files; a record made of arrays is checked alike.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from runtime.errors import InputError
-from runtime.settings.study import SHORTEST
+from runtime.records.clock import JITTER, Stamps, rate_of, sample
+from runtime.settings.record import SHORTEST
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Record:
     """What was measured, joint side, SI, uniformly sampled. The arrays are read-only copies.
 
     Parameters
     ----------
-    t : ndarray, shape (N,), s.   q : ndarray, shape (N, n), rad or m.   tau : ndarray, shape (N, n), N m or N.
-    rate : sampling rate, Hz.   q_r : what the controller followed, shape (N, n), where it is known.
-    files : SHA-256 (of the uncompressed bytes) by file name, for the provenance of results.
-    time : what its time stamps were like and what was done about it, a sentence; "" where there were none.
+    t : array_like, shape (N,), s
+        Uniform within `jitter`.
+    q : array_like, shape (N, n) or (N,), rad or m
+        Joint positions.
+    tau : array_like, shape (N, n) or (N,), N m or N
+        Joint torques.
+    rate : float, Hz, optional
+        Checked against t. Default: (N - 1)/(t[-1] - t[0]).
+    name : str
+        How results call the record.
+    files : mapping of str to str
+        SHA-256 of the uncompressed bytes, by file name.
+    q_r : array_like, shape (N, n), rad or m, optional
+        What the controller followed.
+    time : str
+        What the time stamps were like and what was done about them, a sentence; "" where there were none.
+    jitter : float
+        Largest deviation of t from a uniform grid, sampling periods.
+
+    Raises
+    ------
+    InputError
+        Shapes that differ, numbers that are not finite, fewer than 10 samples, or a clock that runs back, is not uniform or contradicts `rate`.
     """
 
     t: Array
     q: Array
     tau: Array
     rate: float
-    name: str = "record"
-    files: Mapping[str, str] = field(default_factory=dict)
-    q_r: Array | None = None
-    time: str = ""
+    name: str
+    files: Mapping[str, str]
+    q_r: Array | None
+    time: str
+    jitter: float
 
-    def __post_init__(self) -> None:
-        t, q, tau = (np.array(x, dtype=float) for x in (self.t, self.q, self.tau))
-        q, tau = (x[:, None] if x.ndim == 1 else x for x in (q, tau))
-        if t.ndim != 1 or q.ndim != 2 or q.shape != tau.shape or len(q) != len(t):
-            raise InputError(f"t {t.shape}, q {q.shape}, tau {tau.shape}; expected (N,), (N, n), (N, n)", file=self.name)
-        if len(t) < SHORTEST:
-            raise InputError(f"{len(t)} samples; a record has at least {SHORTEST}", file=self.name)
-        if not (np.isfinite(self.rate) and self.rate > 0):
-            raise InputError(f"rate {self.rate} Hz; expected a positive number", file=self.name)
-        for label, x in (("t", t[:, None]), ("q", q), ("tau", tau)):
-            check_finite(x, [label] if label == "t" else [f"{label}{j + 1}" for j in range(x.shape[1])], self.name)
-        given = [("t", t), ("q", q), ("tau", tau)]
-        if self.q_r is not None:
-            q_r = np.array(self.q_r, dtype=float).reshape(len(t), -1)
-            if q_r.shape != q.shape:
-                raise InputError(f"q_r {q_r.shape}, q {q.shape}; expected the same", file=self.name)
-            check_finite(q_r, [f"qr{j + 1}" for j in range(q.shape[1])], self.name)
-            given.append(("q_r", q_r))
-        for label, x in given:
+    def __init__(
+        self,
+        t: ArrayLike,
+        q: ArrayLike,
+        tau: ArrayLike,
+        *,
+        rate: float | None = None,
+        name: str = "record",
+        files: Mapping[str, str] | None = None,
+        q_r: ArrayLike | None = None,
+        time: str = "",
+        jitter: float = JITTER,
+    ) -> None:
+        file = ", ".join(files or ()) or name
+        given = {"t": np.array(t, dtype=float), "q": np.array(q, dtype=float), "tau": np.array(tau, dtype=float)}
+        shapes = ", ".join(f"{label} {x.shape}" for label, x in given.items())
+        given |= {label: given[label][:, None] for label in ("q", "tau") if given[label].ndim == 1}
+        N = len(given["t"]) if given["t"].ndim == 1 else -1
+        if given["q"].ndim != 2 or given["q"].shape != given["tau"].shape or len(given["q"]) != N:
+            raise InputError(f"{shapes}; expected (N,), (N, n), (N, n)", file=file)
+        if N < SHORTEST:
+            raise InputError(f"{N} samples; a record has at least {SHORTEST}", file=file)
+        if q_r is not None:
+            given["q_r"] = np.array(q_r, dtype=float).reshape(N, -1)
+            if given["q_r"].shape != given["q"].shape:
+                raise InputError(f"q_r {given['q_r'].shape}, q {given['q'].shape}; expected the same", file=file)
+        for label, x in given.items():
+            require_finite(x, label.replace("_", ""), file)
             x.setflags(write=False)
-            object.__setattr__(self, label, x)
-        object.__setattr__(self, "files", MappingProxyType(dict(self.files)))
+        if rate is not None and not (np.isfinite(rate) and rate > 0):
+            raise InputError(f"rate {rate} Hz; expected a positive number", file=file)
+        rate = rate_of(Stamps(file, rate=rate, jitter=jitter), given["t"])
+        others = {"rate": rate, "name": name, "files": MappingProxyType(dict(files or {})), "q_r": None, "time": time, "jitter": jitter}
+        for label, value in (others | given).items():
+            object.__setattr__(self, label, value)
 
     @property
     def n(self) -> int:
@@ -72,17 +108,18 @@ class Record:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Records travel to other processes; a read-only mapping alone could not."""
-        return Record, (self.t, self.q, self.tau, self.rate, self.name, dict(self.files), self.q_r, self.time)
+        others = {name: getattr(self, name) for name in ("rate", "name", "q_r", "time", "jitter")}
+        return partial(Record, files=dict(self.files), **others), (self.t, self.q, self.tau)
 
 
-def check_finite(x: Array, names: list[str], file: str) -> None:
-    """Raise InputError at the first value of x, shape (N, columns), that is not finite; samples count from 1."""
+def require_finite(x: Array, label: str, file: str) -> None:
+    """Raise InputError at the first value of x, shape (N,) or (N, k), that is not finite; columns are called label1, label2 ..."""
     bad = np.argwhere(~np.isfinite(x))
     if len(bad):
-        i, j = bad[0]
+        value, column = x[tuple(bad[0])], label if x.ndim == 1 else f"{label}{bad[0][1] + 1}"
         raise InputError(
-            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut the record",
+            f"{value} ({len(bad)} such values in all); expected finite numbers, repair or cut the record",
             file=file,
-            column=names[j],
-            row=f"sample {i + 1}",
+            column=column,
+            row=sample(int(bad[0][0])),
         )

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 import scipy.io
 
-from runtime.estimators.estimate import Estimate, json_text
+from runtime.estimators.estimate import Estimate
+from runtime.json_documents import json_text
 from runtime.resolution.result import Cestac
 
 Array = np.ndarray
@@ -99,16 +100,16 @@ def mat(arrays: Mapping[str, Array]) -> bytes:
 
 def matlab_names(names: Iterable[str]) -> tuple[str, ...]:
     """Each name as MATLAB allows it: a letter, then letters, digits and _, at most 63, no keyword, none twice."""
-    found: list[str] = []
+    allowed: list[str] = []
     for name in names:
         own = re.sub(r"[^A-Za-z0-9_]", "_", name)
         own = own if re.match("[A-Za-z]", own) and own not in KEYWORDS else f"x{own}"
         k, free = 1, own[:LONGEST_NAME]
-        while free in found:
+        while free in allowed:
             k += 1
             free = f"{own[: LONGEST_NAME - len(str(k)) - 1]}_{k}"
-        found.append(free)
-    return tuple(found)
+        allowed.append(free)
+    return tuple(allowed)
 
 
 def cestac_csv(result: Cestac) -> str:

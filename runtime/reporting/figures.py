@@ -103,22 +103,23 @@ def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
     return figure
 
 
-def error_against_resolution(result: Cestac, names: Sequence[str] = (), unit: str = "rad") -> Figure:
+def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figure:
     """%e (21) against Delta on logarithmic axes, with the limits of the verdict and the increase of the residual.
 
     names : parameters drawn in colour; default: the six of smallest %sigma (11). The other deciding ones are grey.
     """
     levels = [level for level in result.levels if level.level.delta and not level.level.torque]
     levels.sort(key=lambda level: level.level.delta)
+    unit = "m" if {result.reference.units.get(name, "") for name in result.names} & {"N*s/m", "kg"} else "rad"
     delta = np.array([level.level.delta for level in levels])
     e = np.array([level.e for level in levels]).reshape(len(levels), -1)
-    chosen = [name for name in names if name in result.names] or _sharpest(result)
+    coloured = [name for name in names if name in result.names] or _sharpest(result)
     with mpl.rc_context(STYLE):
         figure, (ax,) = panels_figure(1, 1, (6.4, 4.4))
         for name in result.deciding:
-            if name not in chosen:
+            if name not in coloured:
                 ax.plot(delta, _drawn(e[:, result.names.index(name)]), color="#C8C8C8", linewidth=0.8, zorder=1)
-        for (color, marker), name in zip(MARKED, chosen, strict=False):
+        for (color, marker), name in zip(MARKED, coloured, strict=False):
             ax.plot(delta, _drawn(e[:, result.names.index(name)]), color=color, marker=marker, markersize=5, linewidth=1.4, label=name)
         ax.plot(
             delta,

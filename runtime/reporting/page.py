@@ -20,6 +20,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from runtime.markup import Markup, element
 from runtime.reporting.series import Series
+from runtime.table import Table
 
 State = Literal["good", "doubtful", "no", "open", ""]
 SCRIPTS = ("chart.js", "page.js")
@@ -28,36 +29,16 @@ WORDS = {"good": "good", "doubtful": "doubtful", "no": "no", "open": "not judged
 
 
 @dataclass(frozen=True)
-class Table:
-    """Cells are text or Markup; the first of a row names it and stands to the left, the others to the right. `note` follows the table.
-
-    wide : numbers of columns (from 0) of words, to the left.   sortable : by any column, where scripts run.
-    kinds : one word per row; a button `only` then leaves the rows of the first kind.   stacked : on a narrow screen every row is a block of lines.
-    """
-
-    caption: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    note: str = ""
-    wide: Sequence[int] = ()
-    sortable: bool = False
-    kinds: Sequence[str] = ()
-    only: str = ""
-    stacked: bool = False
-
-    def __post_init__(self) -> None:
-        wrong = [row for row in self.rows if len(row) != len(self.header)]
-        if wrong:
-            raise ValueError(
-                f"table {self.caption!r}: {len(wrong[0])} cells in {tuple(wrong[0])}; expected {len(self.header)}, {self.header}"
-            )
-        if self.kinds and len(self.kinds) != len(self.rows):
-            raise ValueError(f"table {self.caption!r}: {len(self.kinds)} kinds; expected {len(self.rows)}, one per row")
-
-
-@dataclass(frozen=True)
 class Matrix:
-    """A square table of numbers between -1 and 1, shaded by their size; `names` of rows and columns."""
+    """A square table of numbers between -1 and 1, shaded by their size.
+
+    Attributes
+    ----------
+    caption : str
+    names : sequence of str
+        Of the rows and of the columns.
+    values : sequence of sequences of float
+    """
 
     caption: str
     names: Sequence[str]
@@ -71,7 +52,17 @@ class Matrix:
 
 @dataclass(frozen=True)
 class Image:
-    """A figure as SVG; `alt` says what it shows to those who do not see it. series : what a script draws in its place."""
+    """A figure.
+
+    Attributes
+    ----------
+    caption : str
+    svg : bytes
+    alt : str
+        What the figure shows, for those who do not see it.
+    series : Series or None
+        What a script draws in its place.
+    """
 
     caption: str
     svg: bytes
@@ -107,9 +98,25 @@ class Number:
 
 @dataclass(frozen=True)
 class Page:
-    """verdict : one sentence.   state : of the verdict, with the `answer` to the `question` in a word or two.   remarks : (what, sentence) after it.
+    """A report.
 
-    warning : what must not be overlooked, such as simulated data.
+    Attributes
+    ----------
+    title : str
+    verdict : str
+        One sentence.
+    sections : sequence of Section
+    warning : str
+        What must not be overlooked, such as simulated data.
+    footer : str
+    state : State
+        Of the verdict.
+    question, answer : str
+        What the verdict answers, and the answer in a word or two.
+    remarks : sequence of (str, str)
+        Subject and sentence, after the verdict.
+    numbers : sequence of Number
+        The figures under the verdict.
     """
 
     title: str
@@ -124,7 +131,7 @@ class Page:
     numbers: Sequence[Number] = ()
 
 
-def told(state: State) -> Markup:
+def state_mark(state: State) -> Markup:
     """A state as sign and word, coloured besides."""
     return element("span", f"{SIGNS[state]} {WORDS[state]}" if state else "", class_=f"state {state}")
 
@@ -137,7 +144,7 @@ def render(page: Page) -> str:
     allowed = f"script-src '{_hash(script)}'; " if scripted else ""
     return _template().render(
         page=page,
-        told=told,
+        state_mark=state_mark,
         signs=SIGNS,
         style=Markup(style),
         script=Markup(script),

@@ -10,10 +10,11 @@ import numpy as np
 
 from runtime.estimators.essential import Removal
 from runtime.estimators.estimate import Estimate
-from runtime.identification.identification import Identification
+from runtime.identification.result import Identification
 from runtime.markup import element, formula, number, symbol, unit
 from runtime.model.generated import GeneratedModel
-from runtime.reporting.page import Section, Table
+from runtime.reporting.page import Section
+from runtime.table import Table
 
 HEADER = ("parameter", "value", "σ", "%σ", "corrected σ", "unit", "CAD", "difference %", "all fitted", "%σ of it", "role", "made of")
 
@@ -32,13 +33,13 @@ def cad_values(model: GeneratedModel) -> dict[str, float]:
     return {name: value for name, value in X.items() if math.isfinite(value)}
 
 
-def parameter_section(found: Identification) -> Section:
+def parameter_section(result: Identification) -> Section:
     """One line per base parameter; essential ones carry the value to use."""
-    kept, every = found.carried, found.every
-    cad, roles = cad_values(found.model), roles_of(found)
-    formulas: Mapping[str, str] = getattr(found.model, "FORMULAS", {})
+    fit, estimate = result.model_estimate, result.estimate
+    cad, roles = cad_values(result.model), roles_of(result)
+    formulas: Mapping[str, str] = getattr(result.model, "FORMULAS", {})
     rows = []
-    for i, name in enumerate(every.names):
+    for i, name in enumerate(estimate.names):
         made = formulas.get(name, name)
         fold = element(
             "details", element("summary", "formula", aria_label=f"formula of {name}"), element("span", symbol(name), " = "), formula(made)
@@ -46,19 +47,19 @@ def parameter_section(found: Identification) -> Section:
         rows.append(
             (
                 symbol(name),
-                *_own(kept, name),
-                unit(every.units.get(name, "")),
-                *_beside(cad.get(name, math.nan), kept[name] if name in kept.names else math.nan),
-                number(every.X[i], ".5g"),
-                number(every.relative_sigma[i], ".2f"),
+                *_own(fit, name),
+                unit(estimate.units.get(name, "")),
+                *_compared(cad.get(name, math.nan), fit[name] if name in fit.names else math.nan),
+                number(estimate.X[i], ".5g"),
+                number(estimate.relative_sigma[i], ".2f"),
                 roles[name],
                 "itself" if made == name else fold,
             )
         )
-    kinds = ["essential" if name in kept.names else "removed" for name in every.names]
+    kinds = ["essential" if name in fit.names else "removed" for name in estimate.names]
     shown = [k for k in range(len(HEADER)) if (cad or k not in (6, 7)) and (formulas or k != 11)]
     table = Table(
-        f"{len(every.names)} base parameters, {len(kept.names)} of them carry the model",
+        f"{len(estimate.names)} base parameters, {len(fit.names)} of them carry the model",
         [HEADER[k] for k in shown],
         [[row[k] for k in shown] for row in rows],
         wide=[shown.index(k) for k in (10, 11) if k in shown],
@@ -77,11 +78,11 @@ def parameter_section(found: Identification) -> Section:
     return Section("Parameters", text, tables=[table])
 
 
-def roles_of(found: Identification) -> dict[str, str]:
+def roles_of(result: Identification) -> dict[str, str]:
     """Essential, or when and at which ratio it was removed, by name."""
-    essential = found.found
-    roles = dict.fromkeys(found.every.names, "essential")
-    if found.carried is not essential.estimate:
+    essential = result.essential
+    roles = dict.fromkeys(result.estimate.names, "essential")
+    if result.model_columns == "all":
         roles |= dict.fromkeys(essential.names, "essential by least squares")
     removed = [step for step in essential.trail if step.removed]
     for k, step in enumerate(removed, start=1):
@@ -100,7 +101,7 @@ def _own(fit: Estimate, name: str) -> tuple[str, str, str, str]:
     return number(fit.X[i], ".5g"), number(fit.sigma[i], ".2g"), number(fit.relative_sigma[i], ".2f"), number(fit.sigma_corrected[i], ".2g")
 
 
-def _beside(cad: float, value: float) -> tuple[str, str]:
+def _compared(cad: float, value: float) -> tuple[str, str]:
     """A CAD value and the difference of an estimate to it, %."""
     with np.errstate(divide="ignore", invalid="ignore"):
         difference = 100 * (np.float64(value) - cad) / abs(np.float64(cad))

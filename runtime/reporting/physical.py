@@ -7,8 +7,8 @@ import io
 
 from runtime.estimators.estimate import Estimate
 from runtime.markup import number
-from runtime.reporting.page import Section, Table
-from runtime.table import aligned
+from runtime.reporting.page import Section
+from runtime.table import Table
 
 
 def physical_section(fit: Estimate) -> Section:
@@ -32,13 +32,6 @@ def physical_section(fit: Estimate) -> Section:
         "the values of the robot file.",
     )
     return Section("Physical consistency", text, tables=[conditions, standard])
-
-
-def eigenvalue_table(fit: Estimate) -> str:
-    """The conditions as plain text."""
-    active = fit.details["active"]
-    rows = [(name, f"{value:.4e}", "at its limit" if name in active else "") for name, value in fit.details["smallest_eigenvalues"].items()]
-    return aligned([("condition", "smallest eigenvalue", ""), *rows])
 
 
 def standard_csv(fit: Estimate) -> str:

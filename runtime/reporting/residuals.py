@@ -8,20 +8,20 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from runtime.identification.identification import Identification
 from runtime.identification.residuals import Whiteness
+from runtime.identification.result import Identification
 from runtime.observation.decimation import CUTOFF
 from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, panels_figure, residual_histogram, svg
 from runtime.reporting.page import Image, Section
 
 
-def residual_section(found: Identification, unit: str = "N m") -> Section:
+def residual_section(result: Identification, unit: str = "N m") -> Section:
     """Spectra with the cut-off of the decimation, histograms with the normal law."""
-    seen = found.trust.whiteness
-    if not seen:
+    joints = result.uncertainty.whiteness
+    if not joints:
         return Section("Residuals: spectrum and distribution")
-    cutoff = decimation_cutoff(found)
-    peaks = ", ".join(f"joint {w.joint} {w.peak:.3g} Hz" for w in seen)
+    cutoff = decimation_cutoff(result)
+    peaks = ", ".join(f"joint {w.joint} {w.peak:.3g} Hz" for w in joints)
     text = [
         "A peak at the frequency of the motion is model error, not noise: friction, flexibility or a parameter that is missing. A level that is flat up to "
         "the cut-off and falls behind it is filtered noise, the best there is.",
@@ -29,37 +29,37 @@ def residual_section(found: Identification, unit: str = "N m") -> Section:
     ]
     if cutoff is not None:
         text.append(
-            f"The rows come {found.observation.rate:g} times a second; the filter of the decimation ends at {cutoff:g} Hz (dotted)."
+            f"The rows come {result.observation.rate:g} times a second; the filter of the decimation ends at {cutoff:g} Hz (dotted)."
         )
     images = [
         Image(
             "Spectral density of the residuals",
-            svg(spectra_figure(seen, unit, cutoff)),
+            svg(spectra_figure(joints, unit, cutoff)),
             "Spectral density of the residuals of every joint, by frequency",
         ),
         Image(
             "Residuals over their deviation; line: normal law",
-            svg(residual_histogram(found.comparison, unit)),
+            svg(residual_histogram(result.comparison, unit)),
             "Histograms of the residuals, joint by joint",
         ),
     ]
     return Section("Residuals: spectrum and distribution", text, images)
 
 
-def decimation_cutoff(found: Identification) -> float | None:
+def decimation_cutoff(result: Identification) -> float | None:
     """Where the filter of the parallel decimation ends, Hz; None without one."""
-    if found.study.signals.decimate is None or found.observation.settings.get("factor") == 1:
+    if result.study.signals.decimate is None or result.observation.settings.get("factor") == 1:
         return None
-    return CUTOFF * found.observation.rate / 2
+    return CUTOFF * result.observation.rate / 2
 
 
-def spectra_figure(found: Sequence[Whiteness], unit: str = "N m", cutoff: float | None = None) -> Figure:
+def spectra_figure(joints: Sequence[Whiteness], unit: str = "N m", cutoff: float | None = None) -> Figure:
     """Spectral density of the residuals joint by joint, and the level of white residuals of the same power."""
-    columns = min(3, len(found))
-    rows = -(-len(found) // columns)
+    columns = min(3, len(joints))
+    rows = -(-len(joints) // columns)
     with mpl.rc_context(STYLE):
         figure, axes = panels_figure(rows, columns, (max(5.4, 3.2 * columns), 2.0 * rows + 0.6))
-        for ax, w in zip(axes, found, strict=False):
+        for ax, w in zip(axes, joints, strict=False):
             drawn = w.density > 0
             ax.semilogy(w.frequency[drawn], w.density[drawn], color=BLUE, linewidth=1.1, label="residuals")
             ax.axhline(float(np.mean(w.density)) or 1.0, color=ORANGE, linewidth=1.0, linestyle="--", label="white, same power")
@@ -69,7 +69,7 @@ def spectra_figure(found: Sequence[Whiteness], unit: str = "N m", cutoff: float 
             ax.minorticks_off()
             ax.set_title(f"joint {w.joint}", fontsize=9)
             ax.set_xlabel("frequency, Hz")
-        for ax in axes[len(found) :]:
+        for ax in axes[len(joints) :]:
             ax.set_visible(False)
         figure.supylabel(f"density, ({unit})²/Hz", fontsize=9)
         handles, labels = axes[0].get_legend_handles_labels()

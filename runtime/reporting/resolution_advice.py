@@ -36,17 +36,17 @@ def advice_figure(advice: Advice) -> Figure:
     return figure
 
 
-def _panel(ax: Axes, found: EncoderAdvice, i: int, name: str) -> None:
-    e = np.abs(found.change[:, i])
-    ax.plot(found.delta, np.where(e > 0, e, np.nan), color=BLUE, linewidth=1.3, label="predicted")
-    delta = np.array([point.delta for point in found.sampled])
-    change = np.array([abs(point.change[i]) for point in found.sampled])
-    half = np.array([point.half_width[i] for point in found.sampled])
+def _panel(ax: Axes, encoder: EncoderAdvice, i: int, name: str) -> None:
+    e = np.abs(encoder.change[:, i])
+    ax.plot(encoder.delta, np.where(e > 0, e, np.nan), color=BLUE, linewidth=1.3, label="predicted")
+    delta = np.array([point.delta for point in encoder.sampled])
+    change = np.array([abs(point.change[i]) for point in encoder.sampled])
+    half = np.array([point.half_width[i] for point in encoder.sampled])
     below = np.minimum(half, change - LOWEST / 10).clip(min=0)  # an interval that holds zero ends below the axis
     ax.errorbar(
         delta, change, yerr=np.array([below, half]), color=ORANGE, fmt="o", markersize=3.5, linewidth=1.0, capsize=2, label="sampled, 95 %"
     )
-    for limit in found.limits:
+    for limit in encoder.limits:
         ax.axhline(limit.percent, color=BLACK, linewidth=0.8, linestyle=(0, (1, 2)))
         if np.isfinite(limit.delta):
             ax.axvline(limit.delta, color=GREY, linewidth=0.8)

@@ -53,8 +53,8 @@ def extremes(values: Array, most: int) -> Array:
     length = -(-N // max((most - 2) // (2 * m), 1))
     count = -(-N // length)
     filled = np.concatenate([values, np.repeat(values[:, -1:], count * length - N, axis=1)], axis=1).reshape(m, count, length)
-    found = np.stack([filled.argmin(axis=2), filled.argmax(axis=2)]) + length * np.arange(count)
-    return np.unique(np.concatenate([[0, N - 1], found.ravel().clip(max=N - 1)]))
+    extreme = np.stack([filled.argmin(axis=2), filled.argmax(axis=2)]) + length * np.arange(count)
+    return np.unique(np.concatenate([[0, N - 1], extreme.ravel().clip(max=N - 1)]))
 
 
 def gaps(t: Array) -> Array:

@@ -15,16 +15,26 @@ if TYPE_CHECKING:
     from runtime.motion.result import Simulation
 
 
-def simulation_figure(joints: Sequence[int], found: Simulation, units: Sequence[tuple[str, str]]) -> Figure:
+def simulation_figure(joints: Sequence[int], simulation: Simulation, units: Sequence[tuple[str, str]]) -> Figure:
     """A row per joint: position and reference, tracking error, torque. units : of position and torque, by joint."""
     with mpl.rc_context(STYLE):
         figure, axes = panels_figure(len(joints), 3, (10.5, 1.6 * len(joints) + 0.8))
         for row, (j, (position, torque)) in enumerate(zip(joints, units, strict=True)):
             motion, error, effort = axes[3 * row : 3 * row + 3]
-            _lines(motion, found.t, f"q{j}, {position}", (found.q_r[:, row], GREY, "reference"), (found.q[:, row], BLUE, "simulated"))
-            _lines(error, found.t, f"q{j} - qr{j}, {position}", (found.q[:, row] - found.q_r[:, row], ORANGE, ""))
             _lines(
-                effort, found.t, f"torque {j}, {torque}", (found.tau_measured[:, row], GREY, "recorded"), (found.tau[:, row], BLUE, "exact")
+                motion,
+                simulation.t,
+                f"q{j}, {position}",
+                (simulation.q_r[:, row], GREY, "reference"),
+                (simulation.q[:, row], BLUE, "simulated"),
+            )
+            _lines(error, simulation.t, f"q{j} - qr{j}, {position}", (simulation.q[:, row] - simulation.q_r[:, row], ORANGE, ""))
+            _lines(
+                effort,
+                simulation.t,
+                f"torque {j}, {torque}",
+                (simulation.tau_measured[:, row], GREY, "recorded"),
+                (simulation.tau[:, row], BLUE, "exact"),
             )
         for ax in axes[-3:]:
             ax.set_xlabel("time, s")
@@ -34,6 +44,6 @@ def simulation_figure(joints: Sequence[int], found: Simulation, units: Sequence[
 
 
 def _lines(ax: Any, t: Any, label: str, *lines: tuple[Any, str, str]) -> None:
-    for x, color, name in lines:  # the first of two is seen behind the second
+    for x, color, name in lines:  # the first of two shows behind the second
         ax.plot(t, x, linewidth=2.4 if color == GREY else 0.9, color=color, label=name)
     ax.set_ylabel(label, fontsize=8)

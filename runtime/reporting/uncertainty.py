@@ -1,22 +1,23 @@
-"""Section of a report on how far an identification can be trusted."""
+"""The uncertainty of an identification, as a section of a report."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from runtime.identification.uncertainty import Trust
-from runtime.reporting.page import Section, Table
+from runtime.identification.uncertainty import Uncertainty
+from runtime.reporting.page import Section
+from runtime.table import Table
 
 
-def trust_section(trust: Trust) -> Section:
+def uncertainty_section(uncertainty: Uncertainty) -> Section:
     """Deviations three ways, whiteness, F-tests along the trail, sets by threshold."""
     tables = [
-        _table("Deviations: eq. (10), corrected for correlation, blocks of time drawn again", trust.scatter_lines()),
-        _table("Residuals by joint: correlation of neighbours, Ljung-Box, rows that count, spectrum", trust.whiteness_lines()),
-        _table("F-tests along the trail; rows that count instead of rows", trust.test_lines()),
-        _table("Essential parameters by threshold; - removed besides, + kept besides", trust.set_lines()),
+        _table("Deviations: eq. (10), corrected for correlation, blocks of time drawn again", uncertainty.bootstrap_lines()),
+        _table("Residuals by joint: correlation of neighbours, Ljung-Box, rows that count, spectrum", uncertainty.whiteness_lines()),
+        _table("F-tests along the trail; rows that count instead of rows", uncertainty.test_lines()),
+        _table("Essential parameters by threshold; - removed besides, + kept besides", uncertainty.set_lines()),
     ]
-    return Section("How far to trust it", trust.verdict, tables=tables)
+    return Section("How far to trust it", uncertainty.verdict, tables=tables)
 
 
 def _table(caption: str, lines: Sequence[Sequence[str]]) -> Table:

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from runtime.estimators.estimate import Estimate, json_text
-from runtime.resolution.result import CONFIDENCE, DECIDING, Level, deciding_names
+from runtime.estimators.estimate import Estimate
+from runtime.json_documents import json_text
+from runtime.resolution.result import BIASED, CONFIDENCE, DECIDING, Level, deciding_names
 from runtime.table import Table
 
 Array = np.ndarray
@@ -162,6 +163,12 @@ class Advice:
         e = np.abs(self.steps[step])[decisive]
         k = int(np.argmax(e)) if len(e) else 0
         return (self.names[decisive[k]], float(e[k])) if len(e) else ("", 0.0)
+
+    @property
+    def negative(self) -> bool:
+        """Whether least squares would be biased at one of the steps asked for, or the runs contradict the prediction."""
+        contradicted = any(not limit.agrees for encoder in self.encoders for limit in encoder.limits)
+        return contradicted or any(self.worst(k)[1] > BIASED for k in range(len(self.asked)))
 
     @property
     def verdict(self) -> str:

@@ -29,9 +29,9 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import linear_system
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import assemble
+from runtime.estimators.methods import linear_system
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, joint_units
 from runtime.observation.observation import stack

@@ -22,10 +22,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime import distributed
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import linear_system
 from runtime.estimators.linear import assemble
+from runtime.estimators.methods import linear_system
 from runtime.model.compile_cache import processor
 from runtime.model.compiled import target_of, text_of
 from runtime.model.drives import Drives
@@ -80,7 +79,7 @@ def cestac(
         Processes, 0 for this one (`runtime.parallel`); the results do not depend on it. A script that asks for processes needs the usual
         `if __name__ == "__main__"`.
     scheduler : str, optional
-        Address of a Dask cluster that works instead (`runtime.distributed`), with the same results.
+        Address of a Dask cluster that works instead (`runtime.parallel`), with the same results.
     progress : callable, optional
         Called with the number of runs done and their total.
     checkpoint : Checkpoint, optional
@@ -189,7 +188,7 @@ def _results(task: Task, blocks: Sequence[tuple[Key, ...]], workers: int, schedu
     if not blocks or not (workers or scheduler):
         return results(run_block, task, blocks)
     sent = replace(task, model=text_of(cast(GeneratedModel, task.model)))
-    return distributed.results(run_block, sent, blocks, scheduler) if scheduler else results(run_block, sent, blocks, workers)
+    return results(run_block, sent, blocks, workers, scheduler=scheduler)
 
 
 def _identity(task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:

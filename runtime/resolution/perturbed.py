@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime.errors import SettingsError
-from runtime.estimators.essential import essential
+from runtime.estimators.essential import essential_of
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, ModelText
 from runtime.observation.filters import filtered_states
@@ -101,7 +101,7 @@ def study_columns(
     if wanted == "essential":
         if columns is None:
             observations = [observe(model, record, study, constants=constants) for record in records]
-            return essential(stack(observations), study.essential, study.estimate).names
+            return essential_of(stack(observations), study.essential, study.estimate).names
         wanted = tuple(columns)
     elif wanted == "all":
         wanted = tuple(model.BASE_PARAMETERS)

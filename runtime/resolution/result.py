@@ -23,16 +23,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from scipy.special import stdtrit
 
-from runtime.estimators.estimate import Estimate, json_text
+from runtime.estimators.estimate import Estimate
+from runtime.json_documents import Vector, json_text
 from runtime.latex import error_table, level_table
-from runtime.markup import Markup, number
+from runtime.markup import number
 from runtime.observation.observation import Observation
-from runtime.table import Table, aligned, notebook
+from runtime.table import Table, notebook
 
 Array = np.ndarray
 
@@ -50,13 +51,28 @@ LISTED = 1000
 """Largest number of runs that the JSON text lists; beyond, they are in the archives of the checkpoint (`runtime.resolution.checkpoint`)."""
 MOST_RUNS = 100_000
 """Largest number of runs that `runs_needed` answers."""
+Verdict = Literal["unbiased", "doubtful", "biased"]
 NORMAL, TRIANGULAR = "normal equations", "triangular factor"
 """How the least squares of a run was solved."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run: parameters in column order, ||Y - W_CESTAC X|| in N m, and how the least squares was solved (NORMAL or TRIANGULAR)."""
+    """One run.
+
+    Attributes
+    ----------
+    level : int
+        Number of the level, from 0.
+    run : int
+        Number of the run, from 0.
+    X : tuple of float, SI
+        Parameters in column order.
+    residual_norm : float, N m or N
+        ||Y - W_CESTAC X||.
+    method : str
+        How the least squares was solved: NORMAL or TRIANGULAR.
+    """
 
     level: int
     run: int
@@ -125,7 +141,15 @@ class Runs(Sequence[Run]):
 
 @dataclass(frozen=True)
 class Level:
-    """Steps of one column of the study: position (rad or m) and motor torque (N m or N); 0 means not perturbed."""
+    """Steps of one column of the study; 0 means not perturbed.
+
+    Attributes
+    ----------
+    delta : float, rad or m
+        Step of the position.
+    torque : float, N m or N
+        Step of the motor torque.
+    """
 
     delta: float
     torque: float = 0.0
@@ -144,28 +168,60 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class LevelResult:
-    """One resolution. Arrays have shape (b,), in the order of the names.
+    """One level of a study. Arrays are in the order of the names.
 
-    mean, sigma, relative_sigma, e : eqs. (18)-(21).   half_width : of the Student interval of the mean, SI; `half_width_percent` of |X_LS|.
-    e_rho, e_rho_own, increase, increase_own : the residual, in %; see the head of this module.
-    verdict : "unbiased", "doubtful" or "biased"; residual_verdict : the same of `increase` alone.   decided_by : %e of what decided, by name ("rho" for the residual), largest first.
-    runs_needed : runs after which the intervals of the deciding parameters are narrower than 1 % of X_LS.
+    Attributes
+    ----------
+    level : Level
+        Steps.
+    runs : Runs
+        The runs.
+    mean : ndarray, shape (b,), SI
+        Mean of the runs, eq. (18).
+    sigma : ndarray, shape (b,), SI
+        Standard deviation of the runs, eq. (19).
+    relative_sigma : ndarray, shape (b,), %
+        100 sigma / |mean|, eq. (20).
+    e : ndarray, shape (b,), %
+        100 |1 - mean / X_LS|, eq. (21).
+    half_width : ndarray, shape (b,), SI
+        Half width of the Student interval of the mean.
+    half_width_percent : ndarray, shape (b,), %
+        100 half_width / |X_LS|.
+    e_rho : float, %
+        Eq. (22) as printed.
+    e_rho_own : float, %
+        Eq. (22) with the W of each run.
+    increase : float, %
+        Increase of the residual norm over the norm of Y.
+    increase_own : float, %
+        The same with the W of each run.
+    verdict : str
+        unbiased, doubtful or biased.
+    residual_verdict : str
+        Verdict of `increase` alone.
+    decided_by : mapping of float, %
+        Errors that decided the verdict, by name (rho for the residual), largest first.
+    runs_needed : int
+        Runs after which the intervals of the deciding parameters are narrower than 1 % of X_LS.
+    message : str
+        The verdict in words.
     """
 
     level: Level
     runs: Runs
-    mean: Array
-    sigma: Array
-    relative_sigma: Array
-    e: Array
-    half_width: Array
-    half_width_percent: Array
+    mean: Vector
+    sigma: Vector
+    relative_sigma: Vector
+    e: Vector
+    half_width: Vector
+    half_width_percent: Vector
     e_rho: float
     e_rho_own: float
     increase: float
     increase_own: float
-    verdict: str
-    residual_verdict: str
+    verdict: Verdict
+    residual_verdict: Verdict
     decided_by: Mapping[str, float]
     runs_needed: int
     message: str
@@ -173,9 +229,18 @@ class LevelResult:
 
 @dataclass(frozen=True, eq=False)
 class Cestac:
-    """A resolution study: the reference X_LS, and one result per level.
+    """A resolution study.
 
-    settings : signals, rows, estimator, study and sampling rate, complete; the bandwidth of the noise is among them.
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters, b of them.
+    reference : Estimate
+        X_LS, of the record as measured.
+    levels : tuple of LevelResult
+    settings : mapping
+        Signals, rows, estimator, study and sampling rate, complete: the bandwidth of the noise decides the result.
+    provenance : mapping
     """
 
     names: tuple[str, ...]
@@ -193,9 +258,9 @@ class Cestac:
         return deciding_names(self.reference)
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         """The worst verdict of the levels."""
-        return max((result.verdict for result in self.levels), key=("unbiased", "doubtful", "biased").index, default="unbiased")
+        return max((result.verdict for result in self.levels), key=get_args(Verdict).index, default="unbiased")
 
     @property
     def lists_runs(self) -> bool:
@@ -203,39 +268,46 @@ class Cestac:
         return sum(len(level.runs) for level in self.levels) <= LISTED
 
     def to_table(self) -> str:
-        """As the chapter's Table 3: parameters by levels, then the residual and the verdict."""
-        results = self.levels
-        lines: list[Sequence[str]] = [("parameter", "LS", *(r.level.label for r in results))]
-        for i, name in enumerate(self.names):
-            lines.append((name, f"{self.reference.X[i]:.4g}", *(f"{r.mean[i]:.4g}" for r in results)))
-        lines.append(("largest error %", "", *(f"{max(r.decided_by.values(), default=np.nan):.2f}" for r in results)))
-        lines.append(("%e(rho), printed", "", *(f"{r.e_rho:.2f}" for r in results)))
-        lines.append(("%e(rho), own W", "", *(f"{r.e_rho_own:.2f}" for r in results)))
-        lines.append(("increase / |Y| %", "", *(f"{r.increase:.2f}" for r in results)))
-        lines.append(("increase, own W %", "", *(f"{r.increase_own:.2f}" for r in results)))
-        lines.append(("verdict", "", *(r.verdict for r in results)))
-        lines.append(("verdict of increase", "", *(r.residual_verdict for r in results)))
-        notes = "\n".join(f"{r.level.label}: {r.message}" for r in results)
-        return f"{aligned(lines)}\n\n{notes}"
+        """Means as the chapter's Table 3, residual and verdict, then %e with %sigma, then every verdict in words."""
+        means, residual, errors = self.mean_table(), self.residual_table(), self.error_table()
+        notes = "\n".join(f"{r.level.label}: {r.message}" for r in self.levels)
+        return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{errors.caption}\n{errors.to_text()}"
 
-    def errors_table(self) -> str:
+    def mean_table(self) -> Table:
+        """Mean of the runs of every parameter and level."""
+        rows = [(name, number(self.reference.X[i]), *(number(r.mean[i]) for r in self.levels)) for i, name in enumerate(self.names)]
+        return Table("Mean of the runs (18)", ("parameter", "LS", *(r.level.label for r in self.levels)), rows)
+
+    def error_table(self) -> Table:
         """%e (21) and, in brackets, %sigma (20) of every parameter and level; `*` marks parameters that do not decide."""
-        lines: list[Sequence[str]] = [("parameter", *(r.level.label for r in self.levels))]
-        for i, name in enumerate(self.names):
-            mark = "" if name in self.deciding else " *"
-            lines.append((name + mark, *(f"{r.e[i]:.2f} ({r.relative_sigma[i]:.2f})" for r in self.levels)))
-        return aligned(lines)
-
-    def _repr_html_(self) -> str:
-        labels = [r.level.label for r in self.levels]
         rows = [
-            (name, number(self.reference.X[i]), *(f"{number(r.mean[i])} ({number(r.e[i], '.2f')} %)" for r in self.levels))
+            (
+                name if name in self.deciding else f"{name} *",
+                number(self.reference.relative_sigma[i], ".2f"),
+                *(f"{number(r.e[i], '.2f')} ({number(r.relative_sigma[i], '.2f')})" for r in self.levels),
+            )
             for i, name in enumerate(self.names)
         ]
-        rows.append((Markup("%e(ρ)"), "", *(f"{number(r.e_rho, '.2f')} %" for r in self.levels)))
-        rows.append((Markup("verdict"), "", *(r.verdict for r in self.levels)))
-        table = Table("Resolution study", ("parameter", "least squares", *labels), rows, symbols=True)
-        return notebook([f"Resolution study: mean of the runs and, in brackets, %e (21); {self.verdict}"], table)
+        caption = "%e (21) and, in brackets, %sigma (20); * does not decide"
+        return Table(caption, ("parameter", "%sigma of LS", *(r.level.label for r in self.levels)), rows)
+
+    def residual_table(self) -> Table:
+        """Both readings of %e(rho), the increase of the norm, and the verdict, by level."""
+        levels = self.levels
+        rows = [
+            ("largest error of what decides, %", *(number(max(r.decided_by.values(), default=np.nan), ".2f") for r in levels)),
+            ("%e(rho) (22), measured W, as printed", *(number(r.e_rho, ".2f") for r in levels)),
+            ("%e(rho) (22), each run's own W", *(number(r.e_rho_own, ".2f") for r in levels)),
+            ("increase of the norm in % of |Y|, measured W", *(number(r.increase, ".2f") for r in levels)),
+            ("increase of the norm in % of |Y|, own W", *(number(r.increase_own, ".2f") for r in levels)),
+            ("verdict of parameters and residual", *(r.verdict for r in levels)),
+            ("verdict of the increase (measured W) alone", *(r.residual_verdict for r in levels)),
+            ("runs for intervals within 1 %", *(str(r.runs_needed) for r in levels)),
+        ]
+        return Table("Residual and verdict", ("reading", *(r.level.label for r in levels)), rows)
+
+    def _repr_html_(self) -> str:
+        return notebook([f"Resolution study: {self.verdict}"], self.residual_table(), self.mean_table(), self.error_table())
 
     def _repr_latex_(self) -> str:
         return self.to_latex()
@@ -323,7 +395,7 @@ def runs_needed(spread: float) -> int:
     return int(N[np.argmax(enough)]) if enough.any() else MOST_RUNS
 
 
-def _verdict(errors: Mapping[str, float]) -> tuple[str, dict[str, float]]:
+def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
     """Verdict, and the errors that decided it, largest first; the largest one alone when all are negligible."""
     ordered = sorted(errors.items(), key=lambda item: -item[1])
     verdict = _judged(ordered[0][1])
@@ -333,7 +405,7 @@ def _verdict(errors: Mapping[str, float]) -> tuple[str, dict[str, float]]:
     return verdict, {name: value for name, value in ordered if value >= limit}
 
 
-def _judged(error: float) -> str:
+def _judged(error: float) -> Verdict:
     """Verdict of one error, in %."""
     return "unbiased" if error < NEGLIGIBLE else "biased" if error > BIASED else "doubtful"
 

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.estimators import linear_system
+from runtime.estimators.methods import linear_system
 from runtime.estimators.normal_equations import LeastSquares, least_squares
 from runtime.model.compiled import CompiledModel
 from runtime.model.generated import GeneratedModel, ModelText

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import warnings
 from collections.abc import Callable
 
 LONGEST = 200  # characters: a number, not a program
@@ -22,11 +23,12 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def number(text: str) -> float:
-    """Value of an arithmetic text; raises ValueError with the reason if it is none, or not finite and real."""
+    """The value of an arithmetic text; ValueError for other texts and for values that are not finite and real."""
     if len(text) > LONGEST:
         raise ValueError(f"a number of {len(text)} characters; at most {LONGEST}")
     try:
-        value = _value(ast.parse(text.strip(), mode="eval").body)
+        with warnings.catch_warnings(action="ignore"):  # of Python, about numbers that run into words
+            value = _value(ast.parse(text.strip(), mode="eval").body)
     except (SyntaxError, RecursionError, MemoryError):
         raise ValueError(f"{text!r} is not a number; write e.g. 1e-3 or 2*pi/10000") from None
     except (ZeroDivisionError, OverflowError) as e:

@@ -51,7 +51,7 @@ class Law(Settings):
         Gain of the reference acceleration that a cascade feeds forward.
     gain : float or tuple of float, N m or N
         Torque for one unit of u.
-    antiwindup : float, tuple of float, or None
+    antiwindup : float or tuple of float or None
         Largest |I|; null: none.
     """
 
@@ -76,7 +76,7 @@ class Encoder(Settings):
 
     Attributes
     ----------
-    step : float, tuple of float, or None, rad or m
+    step : float or tuple of float or None, rad or m
         Size of the steps; null: none.
     noise : float or tuple of float, rad or m
         Standard deviation of the noise.
@@ -94,9 +94,9 @@ class Torque(Settings):
 
     Attributes
     ----------
-    saturation : float, tuple of float, "limits" or None, N m or N
+    saturation : float or tuple of float or str or None, N m or N
         Largest torque; limits: that of the robot file, where it has one; null: none.
-    step : float, tuple of float, or None, N m or N
+    step : float or tuple of float or None, N m or N
         Step of the converter, after the saturation.
     noise : float or tuple of float, N m or N
         Standard deviation of white noise on the recorded torque.

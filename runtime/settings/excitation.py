@@ -57,7 +57,7 @@ class ExcitationSettings(Settings):
         Positions at the start; null: free.
     spheres : tuple of Sphere
         Balls on the links.
-    apart : tuple of pairs of int, or None
+    apart : tuple of pairs of int or None
         Pairs of balls, by number from 1, that stay apart; null: every pair on frames that are not next to each other.
     gap : float, m
         Smallest distance between the surfaces of such a pair.

@@ -85,9 +85,9 @@ class Scale(Settings):
 
     Attributes
     ----------
-    q : float, tuple of float, or str
+    q : float or tuple of float or str
         On the positions.
-    tau : float, tuple of float, or str
+    tau : float or tuple of float or str
         On the torques; gtau where the file holds force = gtau*vir.
     """
 
@@ -139,9 +139,9 @@ class RecordSettings(Settings):
         Units of the columns.
     scale : Scale
         Factors on the columns.
-    counts_per_revolution : float, tuple of float, or None
+    counts_per_revolution : float or tuple of float or None
         Counts in one turn of the encoder, on the side of q; needed where the unit of q is counts.
-    torque_constant : float, tuple of float, or None, N*m/A or N*m/V
+    torque_constant : float or tuple of float or None, N*m/A or N*m/V
         For tau in A, mA, V; default: that of the robot's drives. On the side of tau: of the motor, or with the gear in it for the joint.
     coupling : str
         Use the off-diagonal part of R for both, for position or torque alone, or for none.

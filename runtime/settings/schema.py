@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import ABCMeta
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, field, fields
+from dataclasses import field, fields
 from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
@@ -21,6 +21,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import ArgsKwargs
 
 from runtime.errors import SettingsError, settings_error, shown
+from runtime.json_documents import plain
 from runtime.settings.arithmetic import number
 
 T = TypeVar("T")
@@ -69,7 +70,7 @@ Whole = Annotated[int, Field(strict=True)]
 Count = Annotated[Whole, Field(ge=1)]
 Seed = Annotated[Whole, Field(ge=0)]
 Flag = Annotated[bool, Field(strict=True)]
-Text = Annotated[str, BeforeValidator(_text)]
+Text = Annotated[str, BeforeValidator(_text), Written(lambda s: {**s, "type": ["string", "integer"]})]
 PerJoint: TypeAlias = T | tuple[T, ...]
 """One value for all joints, or one per joint."""
 Many = Annotated[tuple[T, ...], BeforeValidator(_list), Written(lambda s: {"anyOf": [s, s["items"]]})]
@@ -165,13 +166,6 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
         raise settings_error(e, value, path) from None
 
 
-def plain(value: Any) -> Any:
-    """Tuples as lists, mappings as dicts, at every depth."""
-    if isinstance(value, Mapping):
-        return {k: plain(v) for k, v in value.items()}
-    return [plain(v) for v in value] if isinstance(value, list | tuple) else value
-
-
 def to_mapping(settings: Any) -> dict[str, Any]:
     """Complete plain mapping (dicts, lists, numbers, texts) of a Study or of one of its sections; study_from_mapping(to_mapping(s)) == s."""
-    return plain(asdict(settings))  # type: ignore[no-any-return]
+    return plain(settings)  # type: ignore[no-any-return]

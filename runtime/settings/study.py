@@ -83,7 +83,7 @@ class Decimate(Settings):
 
     Attributes
     ----------
-    factor : int or "auto"
+    factor : int or str
         Samples for one that is kept; auto is eq. (13), n_d = 0.8 ws/(2 wf), rounded down.
     phase : str
         Sample kept: the first (scipy) or the last (MATLAB's decimate).
@@ -282,7 +282,7 @@ class Study(Settings):
         Closed loop of simulation, IV, DIDIM and CLOE.
     excitation : ExcitationSettings or None
         Search for an exciting motion.
-    stream : int, "auto" or "off"
+    stream : int or str
         Samples of the blocks by which records are read; auto: blocks for large files, off: whole records.
     """
 

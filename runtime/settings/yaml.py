@@ -8,7 +8,8 @@ thing that is too deep or too much.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from io import StringIO
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -52,6 +53,17 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
         raise SettingsError(f"not YAML: {e.problem or e.context}", file=file, line=None if mark is None else mark.line + 1) from None
     except Exception as e:  # on malformed text the scanner also raises IndexError, AttributeError and others: none of it is YAML
         raise SettingsError(f"not YAML: {first_line(e)}", file=file) from None
+
+
+def yaml_text(mapping: Mapping[str, Any]) -> str:
+    """A mapping of plain values as YAML, keys in their order, lists of numbers on one line."""
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None
+    yaml.sort_base_mapping_type_on_output = False
+    yaml.width = 140
+    stream = StringIO()
+    yaml.dump(mapping, stream)
+    return stream.getvalue()
 
 
 class _Reader:

@@ -1,4 +1,4 @@
-"""What the verbs on records share: the model of a ROBOT argument, the study of a RECORD argument, errors as one line and exit code 2."""
+"""What the verbs share: the model of a ROBOT argument, the study of RECORD arguments, errors as one line and exit code 2."""
 
 from __future__ import annotations
 
@@ -7,27 +7,21 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
 if TYPE_CHECKING:
     from runtime.model.generated import GeneratedModel
-    from runtime.records.record import Record
-    from runtime.records.stream import Stream
+    from runtime.motion.simulation import Simulator
+    from runtime.resolution.checkpoint import Checkpoint
     from runtime.settings.study import Study
 
 BAD_INPUT, NEGATIVE = 2, 1
+ROBOT = "Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py)."
 RECORDS = "Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side). Further measured files like the first: records of their own."
-BROKEN_PIPE = 141  # as shells have it: 128 + SIGPIPE
-SIMULATED = "SIMULATED"  # first word of the name of a record that was not measured
-SIMULATED_WARNING = (
-    "Everything here was computed on a SIMULATED record, made from the values of the robot file with encoder steps and torque noise. "
-    "No figure in this report was measured."
-)
+BROKEN_PIPE, INTERRUPTED = 141, 130  # as shells have them: 128 + SIGPIPE, 128 + SIGINT
 
 
 def single_thread() -> None:
@@ -39,6 +33,7 @@ def single_thread() -> None:
 @contextmanager
 def reported_errors() -> Iterator[None]:
     """Bad input as one message on the error stream and exit code 2, never a traceback."""
+    from runtime.errors import DataUnavailableError, InputError
     from symgen.errors import SymgenError
 
     try:
@@ -47,16 +42,10 @@ def reported_errors() -> Iterator[None]:
         raise
     except BrokenPipeError:
         _stop_printing()
-    except SymgenError as e:
-        fail(str(e))
+    except (InputError, SymgenError) as e:
+        fail(str(e), lines=isinstance(e, DataUnavailableError))
     except OSError as e:
         fail(f"{e.filename or 'cannot print, or write a temporary file'}: {e.strerror or e}")
-    except Exception as e:
-        from runtime.errors import DataUnavailableError, InputError  # not before it is needed: runtime takes most of a second to load
-
-        if isinstance(e, InputError):
-            fail(str(e), lines=isinstance(e, DataUnavailableError))
-        raise
 
 
 def _stop_printing() -> NoReturn:
@@ -68,167 +57,148 @@ def _stop_printing() -> NoReturn:
 
 
 def fail(message: str, *, lines: bool = False) -> NoReturn:
-    """End with `message` and exit code 2; on one line unless it is meant to have several: what it names may have any characters."""
+    """End with `message` and exit code 2; on one line unless it is meant to have several: names in it may have any characters."""
     from symgen.errors import printable
 
-    said = message if lines else message.replace("\n", "\\n")
-    typer.echo(f"error: {printable(said)}", err=True)
+    text = message if lines else message.replace("\n", "\\n")
+    typer.echo(f"error: {printable(text)}", err=True)
     raise typer.Exit(BAD_INPUT)
 
 
-@contextmanager
-def opened_model(robot: str) -> Iterator[GeneratedModel]:
-    """The model of a packaged robot, a robot file (.yaml, .par, .urdf) or a generated module (.py).
+def say(text: str) -> None:
+    """A line of progress on the error stream."""
+    typer.echo(f"  {text}", err=True)
 
-    A robot is emitted into a folder that lives as long as the block, since other processes load the model from its file.
-    """
+
+def show(text: str, output: Path | None, *, json: bool) -> None:
+    """Print a result, and on the error stream where its report is."""
+    typer.echo(text, nl=not json)
+    if output is not None:
+        typer.echo(f"report: {output / 'report.html'}", err=True)
+
+
+def model_of(robot: str, target: str = "numpy") -> GeneratedModel:
+    """The model of a ROBOT argument. target : "numpy", or "c" for the same in C; one line says why where NumPy serves instead."""
     from runtime.model.generated import load_model
-
-    if Path(robot).suffix == ".py":
-        yield load_model(Path(robot))
-        return
     from runtime.records.formats.table import is_measured
-    from symgen.description import load_robot
-    from symgen.emit.generate import generate_module
 
+    if target not in ("numpy", "c"):
+        fail(f"--target {target}; expected numpy or c")
+    if Path(robot).suffix == ".py":
+        model = load_model(Path(robot))
+        return model if target == "numpy" else _in_c(model, None)
     if Path(robot).is_file() and is_measured(Path(robot)):
         fail(f"{robot}: a measured file, where a robot is expected; the robot comes first, then the record")
-    description = load_robot(robot)
-    text = generate_module(description)
-    with TemporaryDirectory(prefix="symgen-") as folder:
-        path = Path(folder) / f"{description.name}.py"
-        path.write_text(text, encoding="utf-8")
-        yield load_model(path)
+    import symgen
+
+    model = load_model(symgen.model(robot))
+    return model if target == "numpy" else _in_c(model, robot)
 
 
-def in_target(robot: str, model: GeneratedModel, target: str) -> GeneratedModel:
-    """`model` or, for target "c", the same in C, inside the block of `opened_model`: one line says why where NumPy serves instead."""
+def _in_c(model: GeneratedModel, robot: str | None) -> GeneratedModel:
+    """The model with its functions in C. robot : whose C file is emitted; None: the file beside that of the model."""
     import warnings
 
     from runtime.model.compiled import compiled_model
     from runtime.resolution.c.workspace import usable
 
-    if target not in ("numpy", "c"):
-        fail(f"--target {target}; expected numpy or c")
-    if target == "numpy":
-        return model
-    path = Path(str(getattr(model, "__file__", ""))).with_suffix(".c")
-    if Path(robot).suffix != ".py":
+    source = None
+    if robot is not None:
         from symgen.description import load_robot
         from symgen.emit.generate import generate_files
+        from symgen.emit.importing import stored_path
 
-        for text in generate_files(load_robot(robot), targets=("c",)).values():
-            path.write_text(text, encoding="utf-8")
-    with warnings.catch_warnings(record=True) as said:
+        ((name, text),) = generate_files(load_robot(robot), targets=("c",)).items() or [(f"{model.NAME}.c", "")]
+        source = stored_path(name, text)
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = usable(compiled_model(model))
-    for warning in said:
+        compiled = usable(compiled_model(model, source=source))
+    for warning in caught:
         typer.echo(str(warning.message), err=True)
-    return found
+    return compiled
 
 
-def symbolic_file(robot: str, model: GeneratedModel) -> Path:
-    """The CasADi module of `robot`, inside the block of `opened_model`: beside a generated module, else emitted beside `model`."""
+def symbolic_path(robot: str, model: GeneratedModel) -> Path:
+    """The CasADi module of a ROBOT argument: beside a generated module, else emitted."""
     from runtime.errors import ModelError
 
-    here = Path(str(getattr(model, "__file__", "")))
-    path = here.with_name(f"{here.stem}_casadi.py")
-    if Path(robot).suffix != ".py" and not path.exists():
-        from symgen.description import load_robot
-        from symgen.emit.generate import generate_files
+    file = Path(str(getattr(model, "__file__", "")))
+    if Path(robot).suffix == ".py":
+        return file.with_name(f"{file.stem}_casadi.py")
+    import symgen
 
-        files = generate_files(load_robot(robot), targets=("casadi",))
-        if path.name not in files:
-            raise ModelError(f"{model.NAME} has joints that only its closure equations tie; there is no CasADi model of it")
-        path.write_text(files[path.name], encoding="utf-8")
-    return path
+    try:
+        return Path(str(symgen.model(robot, target="casadi").__file__))
+    except symgen.SymgenError as e:
+        raise ModelError(f"{model.NAME} has joints that only its closure equations tie; there is no CasADi model of it") from e
 
 
-def study_and_records(record: str | Sequence[str], model: GeneratedModel) -> tuple[Study, Path, list[Record]]:
-    """The study that one RECORD argument means, or several, the folder of its files, and its records."""
-    from runtime.records.reading import read_records
+def simulator_of(robot: str, model: GeneratedModel, study: Study) -> Simulator | None:
+    """The closed loop of the study where its method simulates one; else None."""
+    from runtime.estimators.methods import CLOSED_LOOP
 
-    study, folder = study_with_records([record] if isinstance(record, str) else record)
-    return study, folder, read_records(study.record, model, folder=folder)
+    if study.estimate.method not in CLOSED_LOOP or study.controller is None:
+        return None
+    from runtime.model.casadi import load_symbolic
+    from runtime.motion.simulation import Simulator
+
+    return Simulator(model, study.controller, symbolic=load_symbolic(symbolic_path(robot, model), of=model))
 
 
-def study_with_records(records: Sequence[str]) -> tuple[Study, Path]:
-    """The study that RECORD arguments mean, which names a record, and the folder of its files.
+def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Study:
+    """The study that RECORD arguments mean, files relative to the current folder.
 
     The first says how they are read: a study file, a dataset or a measured file; each further one is a measured file like it, a record of its own.
+    recorded : whether the study has to name a record.
     """
     from runtime.errors import InputError
     from runtime.records.formats.table import is_measured
     from runtime.records.named import study_of
+    from runtime.settings.location import located
 
-    study, folder = study_of(records[0])
-    if not study.record:
+    study = located(*study_of(records[0]))
+    if recorded and not study.record:
         raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=records[0])
-    like, further = study.record[-1], []
+    further = []
     for record in records[1:]:
         path = Path(record)
         if path.suffix.lower() in (".yaml", ".yml") or not is_measured(path):
             raise InputError(
                 "expected a measured file after the first RECORD: its columns, units and side are those of the first", file=record
             )
-        if len(like.files) > 1:
+        if len(study.record[-1].files) > 1:
             raise InputError("the first RECORD has its positions and torques in two files; name further pairs in record.also", file=record)
-        further.append(replace(like, files=(os.path.relpath(path, folder),), dataset=None, name=None))
-    return replace(study, record=(*study.record, *further)), folder
+        further.append(replace(study.record[-1], files=(record,), dataset=None, name=None))
+    return replace(study, record=(*study.record, *further))
 
 
-def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
-    """Provenance of the records: their names, and whether they were simulated."""
-    simulated = any(record.name.startswith(SIMULATED) for record in records)
-    note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
-    stamps = {record.name: said for record in records if (said := getattr(record, "time", ""))}
-    return {"records": [record.name for record in records], "simulated": simulated, **({"time": stamps} if stamps else {}), **note}
+def with_cestac(study: Study, **given: Any) -> Study:
+    """The study with some of its cestac settings replaced, checked like those of a file; None: as in the study."""
+    from runtime.settings.study import study_from_mapping, to_mapping
+
+    mapping = to_mapping(study)
+    return study_from_mapping({**mapping, "cestac": {**mapping["cestac"], **{k: v for k, v in given.items() if v is not None}}})
 
 
-def study_text(study: Study, folder: Path, destination: Path) -> str:
-    """study.yaml: every setting, defaults included; files relative to `destination`, where the study is written."""
-    from runtime.settings.study import RecordSettings, to_mapping
-
-    def moved(settings: RecordSettings) -> RecordSettings:
-        if settings.dataset is not None:
-            return settings
-        files = tuple(Path(os.path.relpath(folder / file, destination)).as_posix() for file in settings.files)
-        return replace(settings, files=files)
-
-    record, further = tuple(moved(s) for s in study.record), tuple(moved(s) for s in study.validate.record)
-    complete = replace(study, record=record, validate=replace(study.validate, record=further))
-    if study.payload is not None:
-        complete = replace(complete, payload=replace(study.payload, record=tuple(moved(s) for s in study.payload.record)))
-    return yaml_text(to_mapping(complete))
+def names_of(text: str | None) -> str | list[str] | None:
+    """Names separated by commas as a list; essential and all as they are."""
+    return text if text in (None, "essential", "all") else text.split(",")
 
 
-def yaml_text(mapping: dict[str, Any]) -> str:
-    """A mapping as YAML, keys in their order, lists of numbers on one line."""
-    from ruamel.yaml import YAML
-
-    yaml: Any = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None
-    yaml.sort_base_mapping_type_on_output = False
-    yaml.width = 140
-    stream = StringIO()
-    yaml.dump(mapping, stream)
-    return stream.getvalue()
+def stopped(checkpoint: Checkpoint | None) -> NoReturn:
+    """Ctrl-C says what is left of a study and ends with code 130."""
+    kept = f"{checkpoint.written} runs are in {checkpoint.folder}: the same command goes on" if checkpoint and checkpoint.written else ""
+    typer.echo(f"stopped; {kept or 'nothing is kept'}", err=True)
+    raise typer.Exit(INTERRUPTED)
 
 
-def progress_bar(what: str) -> Any:
+@contextmanager
+def progress_bar(what: str) -> Iterator[Any]:
     """A bar of `what` on the error stream; the context gives what long work calls with the number done and their total."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    @contextmanager
-    def bar() -> Any:
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-            task = progress.add_task(what, total=None)
-
-            def advance(done: int, total: int) -> None:
-                progress.update(task, completed=done, total=total)
-
-            yield advance
-
-    return bar()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)

@@ -10,18 +10,24 @@ Nothing here was measured, and the fit is better than that of any real arm: the 
 from __future__ import annotations
 
 import gzip
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from math import pi
-from typing import Literal
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
 
 import numpy as np
 
+from runtime import Record, Study
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, require
+from runtime.model.generated import require
 from runtime.motion.reference import Reference, point_to_point
+from runtime.records.provenance import SIMULATED
+from runtime.records.reading import read_records
 from runtime.settings.controller import Points
 from runtime.settings.study import Columns, RecordSettings
-from symgen.cli.session import SIMULATED
 
 Array = np.ndarray
 
@@ -31,13 +37,46 @@ ENCODER = 2 * pi / 65536  # rad on the motor
 NOISE = 0.02  # standard deviation of the torque noise, of the largest torque of each motor
 
 
-def motor_record(model: GeneratedModel, duration: float, seed: int) -> tuple[bytes, RecordSettings]:
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What a demonstration starts from.
+
+    Attributes
+    ----------
+    model : module
+        Emitted module.
+    study : Study
+        Files relative to the output folder.
+    record : Record
+    note : str
+        Why the record is simulated; "" of a measured one.
+    files : mapping of str to bytes
+        The simulated record, by file name.
+    """
+
+    model: Any
+    study: Study
+    record: Record
+    note: str = ""
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def read_simulated(model: Any, study: Study, record: tuple[bytes, RecordSettings], note: str) -> Prepared:
+    """A simulated record under the settings of `study`, read from its file like any other."""
+    content, settings = record
+    study = replace(study, record=(settings,))
+    with TemporaryDirectory(prefix="symgen-") as folder:
+        (Path(folder) / FILE).write_bytes(content)
+        return Prepared(model, study, read_records(study.record, model, folder=Path(folder))[0], note, {FILE: content})
+
+
+def motor_record(model: Any, duration: float, seed: int) -> tuple[bytes, RecordSettings]:
     """A .csv.gz file t,q1..qn,tau1..taun of the motor side, and the settings that read it."""
     return recorded(model, point_to_point(model, Points(duration, seed), RATE), seed)
 
 
 def recorded(
-    model: GeneratedModel, path: Reference, seed: int, *, rate: float = RATE, encoder: float = ENCODER, noise: float = NOISE
+    model: Any, path: Reference, seed: int, *, rate: float = RATE, encoder: float = ENCODER, noise: float = NOISE
 ) -> tuple[bytes, RecordSettings]:
     """The file, and the settings that read it, of a motion: motor positions in steps of `encoder`, torques with white noise.
 
@@ -45,8 +84,8 @@ def recorded(
     """
     require(model, "base_parameters", "inverse_dynamics")
     drives = Drives.from_mapping(model.DRIVES or {"ratio": np.eye(len(model.JOINTS))})
-    X = model.base_parameters(model.VALUES)  # type: ignore[attr-defined]
-    tau = model.inverse_dynamics(path.q, path.qd, path.qdd, X)  # type: ignore[attr-defined]
+    X = model.base_parameters(model.VALUES)
+    tau = model.inverse_dynamics(path.q, path.qd, path.qdd, X)
     command = drives.motor_command(tau)
     rng = np.random.default_rng([seed, 1])
     command += noise * np.abs(command).max(axis=0) * rng.standard_normal(command.shape)

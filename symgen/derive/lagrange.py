@@ -5,17 +5,22 @@ With T_j(q) the pose of frame j in frame 0 (4 x 4) and Sigma_j the pseudo-inerti
     E = sum_j 1/2 tr(Tdot_j Sigma_j Tdot_j')       Sigma = | tr(J)/2 E3 - J   MS |       J  = [XX XY XZ; XY YY YZ; XZ YZ ZZ]
     U = - sum_j (g', 0) T_j Sigma_j e4                     |      MS'          M |       MS = [MX MY MZ]'
 
-both linear in the standard parameters chi. Elements with parameter c along s = G q, or of form B, add
+both linear in the standard parameters chi. Since dTdot/dqd_i = dT/dq_i, Lagrange's equations are [U65]
 
-    E += c/2 sd**2 | c/2 qd' B qd (inertia)        U += c s (offset),  c/2 s**2 | c/2 q' B q (stiffness)
-    Q  = c G' sd | c B qd (viscous),  c G' sign(sd) (coulomb); `when: positive` keeps max(., 0) of sd or sign(sd), negative min(., 0)
+    Gamma_i = d/dt dE/dqd_i - dE/dq_i + dU/dq_i = sum_j tr(dT_j/dq_i Sigma_j Tddot_j') - (g', 0) dT_j/dq_i Sigma_j e4 ,
 
-and Gamma = d/dt dE/dqd - dE/dq + dU/dq + Q. Coordinates are all joints that move, the cut and passive ones included (the
+dT/dq and Tddot by CasADi. Elements with parameter c along s = G q, or of form B (G'G where they act along s), add
+
+    c B qdd (inertia),  c G' (offset),  c B q (stiffness),  c B qd (viscous),  c G' sign(sd) (coulomb)
+
+with `when: positive` where sd > 0 only, negative where sd < 0. Coordinates are all joints that move, the cut and passive ones included (the
 open tree). A mechanism with loops is the tree restricted to q = f(qa), where phi(q) = 0 closes the loops:
 
     Gamma_a = G' Gamma_tree,   G = dq/dqa,   qd = G qad,   qdd = G qadd + Gdot qad .
 
 The certificates and the tests import this module; nothing else does.
+
+[U65] J. J. Uicker, On the dynamic analysis of spatial linkages using 4 x 4 matrices, Northwestern University, 1965.
 """
 
 from __future__ import annotations
@@ -34,6 +39,7 @@ from symgen.errors import DescriptionError
 
 Array = np.ndarray[Any, Any]
 NEWTON_STEPS, NEWTON_STEP, CLOSED = 50, 0.5, 1e-11  # iterations, rad or m per iteration, defect of a closed loop
+SETTLED = 1e-15  # rad or m: further iterations change nothing
 DRAWS = 20  # attempts to find states in which the loops close
 SX = Any  # casadi.SX
 
@@ -79,53 +85,7 @@ def pseudo_inertia(name: str) -> Array:
     return S
 
 
-def _energies(robot: Robot, T: Mapping[int, SX], q: SX, qd: SX, constants: Mapping[str, float]) -> tuple[SX, SX, SX]:
-    """Kinetic and potential energy per unit of each standard parameter, (p,), and generalised force Q, (n, p)."""
-    n, p = len(robot.moving), len(robot.parameters)
-    column = {name: k for k, name in enumerate(robot.parameters)}
-    E, U, Q = ca.SX.zeros(p), ca.SX.zeros(p), ca.SX.zeros(n, p)
-    g = ca.DM([e.value(constants) for e in robot.gravity] + [0])
-    for j in robot.links:
-        Td = ca.jtimes(T[j], q, qd)
-        K = Td.T @ Td
-        for name in INERTIAL:
-            S = ca.DM(pseudo_inertia(name))
-            k = column[parameter(name, j)]
-            E[k] = ca.sum1(ca.sum2(K * S)) / 2  # tr(Td S Td') = <Td' Td, S>
-            U[k] = -g.T @ T[j] @ S[:, 3]
-    for e in robot.elements:
-        for j in e.keys:
-            k = column[parameter(e.family, j)]
-            E[k], U[k], Q[:, k] = _element(robot, e, j, q, qd, constants)
-    return E, U, Q
-
-
-def _element(robot: Robot, e: Element, j: int, q: SX, qd: SX, constants: Mapping[str, float]) -> tuple[SX, SX, SX]:
-    """Kinetic and potential energy and generalised force of an element's key j for parameter 1."""
-
-    def number(x: Expression) -> float:
-        return x.value(constants)
-
-    index = {i: k for k, i in enumerate(robot.moving)}
-    B = np.zeros((len(index), len(index)))
-    for (i, l), x in e.form.get(j, {}).items():
-        B[index[i], index[l]] = number(x)
-    G = np.zeros((1, len(index)))
-    for i, x in e.along.get(j, {}).items():
-        G[0, index[i]] = number(x)
-    if j in e.along:
-        B = G.T @ G
-    zero = ca.SX.zeros(len(index))
-    if e.kind == "inertia":
-        return qd.T @ B @ qd / 2, 0, zero
-    if e.kind == "stiffness":
-        return 0, q.T @ B @ q / 2, zero
-    if e.kind == "offset":
-        return 0, G @ q, zero
-    sd = G @ qd
-    motion = {None: 1, "positive": sd > 0, "negative": sd < 0}[e.when]
-    force = B @ qd if e.kind == "viscous" else G.T @ ca.sign(sd)
-    return 0, 0, force * motion
+LINK = np.array([pseudo_inertia(name) for name in INERTIAL])  # (10, 4, 4)
 
 
 def _floats(function: Any, *arguments: Array) -> Array:
@@ -138,62 +98,101 @@ def _floats(function: Any, *arguments: Array) -> Array:
     return out.reshape(rows, N, width).transpose(1, 0, 2).reshape(*shape, rows, width)
 
 
+def _matrices(columns: Array) -> Array:
+    """Columns of stacked vec(4 x 4), (..., 16 F, n), as matrices, (..., n, F, 4, 4)."""
+    stacked = np.moveaxis(columns, -1, -2)
+    return np.swapaxes(stacked.reshape(*stacked.shape[:-1], -1, 4, 4), -1, -2)
+
+
 class Lagrange:
     """Dynamics of the open tree of a robot in all its moving joints (order `robot.moving`), geometry in floats.
 
-    Every method takes q, qd, qdd of shape (..., n) and returns the same leading axes. chi is (p,) in the order of
-    `robot.parameters`, or (..., p).
+    Every method takes q, qd, qdd of shape (..., n), rad or m and their rates, and returns the same leading axes. chi is (p,) in the order
+    of `robot.parameters`, or (..., p).
     """
 
     def __init__(self, robot: Robot, constants: Mapping[str, float] | None = None) -> None:
         self.robot, self.names = robot, robot.parameters
         self.constants = {**robot.constants, **(constants or {})}
-        n, p = len(robot.moving), len(robot.parameters)
-        q, qd, qdd, chi = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("qdd", n), ca.SX.sym("chi", p)
+        n = len(robot.moving)
+        q, qd, qdd = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("qdd", n)
         T = poses(robot, {j: q[k] for k, j in enumerate(robot.moving)}, self.constants)
-        kinetic, potential, friction = _energies(robot, T, q, qd, self.constants)
-        E, U = ca.dot(kinetic, chi), ca.dot(potential, chi)
-        momentum = ca.gradient(E, qd)
-        rate = ca.jtimes(momentum, ca.vertcat(q, qd), ca.vertcat(qd, qdd))
-        gamma = rate - ca.gradient(E, q) + ca.gradient(U, q) + friction @ chi
-        self._gamma = ca.Function("gamma", [q, qd, qdd, chi], [gamma])
-        self._regressor = ca.Function("regressor", [q, qd, qdd], [ca.densify(ca.jacobian(gamma, chi))])
-        self._inertia = ca.Function("inertia", [q, chi], [ca.densify(ca.jacobian(momentum, qd))])
-        self._gravity = ca.Function("gravity", [q, chi], [ca.densify(ca.gradient(U, q))])
-        self._poses = ca.Function("poses", [q], [ca.densify(ca.horzcat(*(T[f.j] for f in robot.frames)))])
-        self._jacobians = ca.Function("jacobians", [q], [ca.densify(ca.horzcat(*(_jacobian(T[f.j], q) for f in robot.frames)))])
+        t = ca.vertcat(*(ca.vec(T[f.j]) for f in robot.frames))
+        rate = ca.jtimes(t, q, qd)
+        self._poses = ca.Function("poses", [q], [ca.densify(t)])
+        self._slopes = ca.Function("slopes", [q], [ca.densify(ca.jacobian(t, q))])
+        self._accelerations = ca.Function(
+            "accelerations", [q, qd, qdd], [ca.densify(ca.jtimes(rate, ca.vertcat(q, qd), ca.vertcat(qd, qdd)))]
+        )
         phi = _closure(robot, T, q, self.constants)
         self._loop = ca.Function("loop", [q], [phi])
         self._loop_jacobian = ca.Function("loop_jacobian", [q], [ca.densify(ca.jacobian(phi, q))])
         self._loop_rate = ca.Function("loop_rate", [q, qd], [ca.densify(ca.jtimes(ca.jtimes(phi, q, qd), q, qd))])
         self._start = _start(robot, q, self.constants)
 
-    def torque(self, q: Array, qd: Array, qdd: Array, chi: Array) -> Array:
-        """Gamma, (..., n)."""
-        return _floats(self._gamma, q, qd, qdd, chi)[..., 0]
+    def poses(self, q: Array) -> Array:
+        """0Tj of every frame in file order, (..., frames, 4, 4)."""
+        return _matrices(_floats(self._poses, q))[..., 0, :, :, :]
+
+    def slopes(self, q: Array) -> Array:
+        """d0Tj/dq_i, (..., n, frames, 4, 4)."""
+        return _matrices(_floats(self._slopes, q))
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
         """D with Gamma = D chi, (..., n, p)."""
-        return _floats(self._regressor, q, qd, qdd)
+        robot = self.robot
+        dT, ddT = self.slopes(q), _matrices(_floats(self._accelerations, q, qd, qdd))[..., 0, :, :, :]
+        g = np.array([e.value(self.constants) for e in robot.gravity] + [0.0])
+        column = {name: k for k, name in enumerate(self.names)}
+        D = np.zeros((*dT.shape[:-3], len(self.names)))
+        for j in robot.links:
+            slope, first = dT[..., j - 1, :, :], column[parameter(INERTIAL[0], j)]
+            inertia = np.einsum("...iab,...ac->...ibc", slope, ddT[..., j - 1, :, :])
+            D[..., first : first + len(INERTIAL)] = np.einsum("...ibc,sbc->...is", inertia, LINK)
+            D[..., first : first + len(INERTIAL)] -= np.einsum("a,...iab,sb->...is", g, slope, LINK[:, :, 3])
+        for e in robot.elements:
+            for j in e.keys:
+                D[..., column[parameter(e.family, j)]] = self._element(e, j, q, qd, qdd)
+        return D
 
-    def inertia_matrix(self, q: Array, chi: Array) -> Array:
-        """A = d2E/dqd2, (..., n, n)."""
-        return _floats(self._inertia, q, chi)
+    def _element(self, e: Element, j: int, q: Array, qd: Array, qdd: Array) -> Array:
+        """Gamma of an element's key j for parameter 1, (..., n)."""
+        index = {i: k for k, i in enumerate(self.robot.moving)}
+        G, B = np.zeros(len(index)), np.zeros((len(index), len(index)))
+        for i, x in e.along.get(j, {}).items():
+            G[index[i]] = x.value(self.constants)
+        for (i, l), x in e.form.get(j, {}).items():
+            B[index[i], index[l]] = x.value(self.constants)
+        if j in e.along:
+            B = np.outer(G, G)
+        if e.kind in ("inertia", "stiffness"):
+            return np.asarray({"inertia": qdd, "stiffness": q}[e.kind] @ B)
+        if e.kind == "offset":
+            return np.broadcast_to(G, np.shape(q))
+        sd = np.asarray(qd @ G)[..., None]
+        force = np.asarray(qd @ B if e.kind == "viscous" else np.sign(sd) * G)
+        return force if e.when is None else force * (sd > 0 if e.when == "positive" else sd < 0)
+
+    def torque(self, q: Array, qd: Array, qdd: Array, chi: Array) -> Array:
+        """Gamma, (..., n)."""
+        return np.asarray((self.regressor(q, qd, qdd) @ np.asarray(chi)[..., None])[..., 0])
 
     def gravity(self, q: Array, chi: Array) -> Array:
         """dU/dq, (..., n): Gamma at rest without friction; gravity, offsets and springs."""
-        return _floats(self._gravity, q, chi)[..., 0]
+        return self.torque(q, 0 * q, 0 * q, chi)
 
-    def poses(self, q: Array) -> Array:
-        """0Tj of every frame in file order, (..., frames, 4, 4)."""
-        T = _floats(self._poses, q)
-        return np.moveaxis(T.reshape(*T.shape[:-1], -1, 4), -2, -3)
+    def inertia_matrix(self, q: Array, chi: Array) -> Array:
+        """A = d2E/dqd2, (..., n, n): column i is Gamma for a unit acceleration of joint i, less Gamma at rest."""
+        rest = self.gravity(q, chi)
+        columns = [self.torque(q, 0 * q, np.broadcast_to(e, np.shape(q)), chi) - rest for e in np.eye(np.shape(q)[-1])]
+        return np.stack(columns, axis=-1)
 
     def jacobian(self, q: Array, frame: int | None = None) -> Array:
-        """Velocity of the origin, then angular velocity, of `frame` (default: the last) in frame 0 per qd, (..., 6, n)."""
-        J = _floats(self._jacobians, q)
-        n, j = len(self.robot.moving), frame or self.robot.frames[-1].j
-        return J[..., (j - 1) * n : j * n]
+        """Velocity of the origin, then angular velocity w from hat(w) = Rdot R', of `frame` (default: the last) in frame 0 per qd, (..., 6, n)."""
+        j = frame or self.robot.frames[-1].j
+        slope, R = self.slopes(q)[..., j - 1, :3, :], self.poses(q)[..., j - 1, :3, :3]
+        W = slope[..., :3] @ np.swapaxes(R, -1, -2)[..., None, :, :]
+        return np.swapaxes(np.concatenate([slope[..., 3], np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)], axis=-1), -1, -2)
 
     def motion(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
         """Tree motion q, qd, qdd (..., n) and G = dq/dqa (..., n, n_a) of the actuated q, qd, qdd (..., n_a).
@@ -210,6 +209,8 @@ class Lagrange:
         for _ in range(NEWTON_STEPS):
             step = np.linalg.pinv(_floats(self._loop_jacobian, x)[..., passive]) @ _floats(self._loop, x)
             x[..., passive] -= np.clip(step[..., 0], -NEWTON_STEP, NEWTON_STEP)
+            if np.abs(step).max() < SETTLED:
+                break
         J = _floats(self._loop_jacobian, x)
         inverse = np.linalg.pinv(J[..., passive])
         G[..., passive, :] = -inverse @ J[..., actuated]
@@ -223,16 +224,6 @@ class Lagrange:
         """G' D_tree at actuated q, qd, qdd (..., n_a), order `robot.joints`: (..., n_a, p)."""
         *state, G = self.motion(q, qd, qdd)
         return np.swapaxes(G, -1, -2) @ self.regressor(*state)
-
-
-def _jacobian(T: SX, q: SX) -> SX:
-    """6 x n of a pose: velocity of the origin; angular velocity w from hat(w) = Rdot R'."""
-    R, dR = T[:3, :3], ca.jacobian(ca.vec(T[:3, :3]), q)
-    columns = []
-    for k in range(q.shape[0]):
-        W = ca.reshape(dR[:, k], 3, 3) @ R.T
-        columns.append(ca.vertcat(W[2, 1], W[0, 2], W[1, 0]))
-    return ca.vertcat(ca.jacobian(T[:3, 3], q), ca.horzcat(*columns))
 
 
 def _closure(robot: Robot, T: Mapping[int, SX], q: SX, constants: Mapping[str, float]) -> SX:
@@ -293,37 +284,26 @@ class Sample:
         return self.D.transpose(1, 0, 2).reshape(-1, self.D.shape[2])
 
 
-def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
-    """Largest coefficient of each actuated joint among the rows of elements that several joints share, at least 1; shape (n,)."""
-    shared = [row for e in robot.elements for row in e.along.values() if len(row) > 1]
-    return np.array([max([1.0, *(abs(row[j].value(constants)) for row in shared if j in row)]) for j in robot.joints])
-
-
 def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None) -> Sample:
     """The standard regressor at `states` random states: q within pi rad or 1 m, general loops within 0.5 of their start.
 
-    Velocities and accelerations are standard normal; in every other state each velocity is divided by its leverage, so that the sign of
-    q4 + 101.25 q5 is not that of q5 alone. Raises DescriptionError where the loops close in too few of the states.
+    Velocities and accelerations are standard normal. Raises DescriptionError where the loops close in too few of the states.
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
     start = {j: x for loop in robot.loops for j, x in loop.start.items()}
     free = not robot.loops or set(robot.passive) <= set(robot.constraints)
-    longest = max([abs(e.value(model.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)], default=0.0)
-    slide = 1.0 if free else min(0.5, longest / 4)
-    reach = np.array([(np.pi if free else 0.5) if robot.frame(j).sigma == REVOLUTE else slide for j in robot.joints])
+    reach = np.array([np.pi if robot.frame(j).sigma == REVOLUTE and free else 1.0 if free else 0.5 for j in robot.joints])
     centre = np.array([start.get(j, 0.0) for j in robot.joints])
-    n, leverage = len(robot.joints), _leverage(robot, model.constants)
+    n = len(robot.joints)
     state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
     for _ in range(DRAWS):
         q, qd, qdd = centre + reach * rng.uniform(-1, 1, (states, n)), *rng.standard_normal((2, states, n))
-        qd[::2] /= leverage
         block = model.actuated_regressor(q, qd, qdd)
         closed = np.isfinite(block).all(axis=(1, 2))
         D = np.concatenate([D, block[closed]])[:states]
         state = np.concatenate([state, np.array([q, qd, qdd])[:, closed]], axis=1)[:, :states]
         if len(D) == states:
-            q, qd, qdd = state
-            return Sample(model, q, qd, qdd, D)
+            return Sample(model, state[0], state[1], state[2], D)
     if not robot.passive:
         raise DescriptionError(
             f"{robot.name}: torques are not finite for the constants {dict(robot.constants)}; check their values", path=("constants",)
@@ -348,6 +328,6 @@ def in_one_mode(robot: Robot) -> Robot:
     """
     closure = close(robot)
     if closure.tied:
-        return replace(robot, loops=tuple(replace(loop, start=dict(closure.start)) for loop in robot.loops))
+        return robot
     declared = {j: sum((g * Expression.symbol(f"q{i}") for i, g in closure.row[j].items()), closure.offset[j]) for j in robot.passive}
     return replace(robot, constraints=declared)

@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 
 from symgen.derive.closure import Closure, open_tree
-from symgen.derive.exact import Draw, Fp, fixed_angles
+from symgen.derive.exact import Array, Draw, Fp, fixed_angles
 from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
 from symgen.derive.kinematics import frame_poses
@@ -26,7 +26,6 @@ from symgen.description.forms import row_of
 from symgen.description.robot import REVOLUTE, Loop, Robot
 from symgen.errors import DescriptionError
 
-Array = np.ndarray
 STARTS, STEPS, TOLERANCE = 60, 60, 1e-11
 STALLED = 12  # Newton steps without progress before a start is given up
 CLOSED = 1e-6  # residual below which two frames coincide

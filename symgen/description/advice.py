@@ -22,7 +22,7 @@ _YAML = {  # what the scanner says: what to change
 
 def yaml_advice(problem: str) -> str:
     """What to change where the YAML scanner says `problem`."""
-    return next((f"; {advice}" for said, advice in _YAML.items() if said in problem), "")
+    return next((f"; {advice}" for part, advice in _YAML.items() if part in problem), "")
 
 
 def symbol_advice(name: str, declared: Iterable[str]) -> str:
@@ -33,14 +33,14 @@ def symbol_advice(name: str, declared: Iterable[str]) -> str:
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
-def unit_advice(found: str) -> str:
+def unit_advice(token: str) -> str:
     """For what follows a number and is no operator: a unit."""
-    unit = found.lower()
+    unit = token.lower()
     if unit in ("deg", "degree", "degrees", "°", "grad"):
         return "; angles are in rad: 90 degrees are pi/2"
     if unit in ("mm", "cm", "m", "in", "kg", "g", "rad"):
         return "; write the number alone: everything is in SI and rad"
-    return "; a power is written **" if found == "^" else ""
+    return "; a power is written **" if token == "^" else ""
 
 
 def degrees_advice(angle: Expression, constants: dict[str, float]) -> str:

@@ -24,17 +24,25 @@ def packaged_robots() -> tuple[str, ...]:
 
 
 def load_robot(source: str | Path, *, keep_fixed: bool = False) -> Robot:
-    """The robot described by a file, or a packaged one by its name.
+    """The robot of a file, or a packaged one by its name.
 
     Parameters
     ----------
-    source : name of a packaged robot (`tx40`) or path of a robot file (`arm.yaml`, `./tx40`), a `.par` file, a `.urdf`, or an MJCF
+    source : str or Path
+        Name of a packaged robot (`tx40`), or path of a robot file (`arm.yaml`, `./tx40`), a `.par` file, a URDF (`.urdf`) or an MJCF
         (`.xml`, `.mjcf`; extra `mjcf`).
-    keep_fixed : of a URDF or MJCF, keep links that fixed joints hold as fixed frames, as `read_urdf`.
+    keep_fixed : bool
+        Of a URDF or MJCF: links that fixed joints hold are fixed frames of their own, as by `read_urdf`.
+
+    Returns
+    -------
+    Robot
+        Checked, and frozen.
 
     Raises
     ------
-    DescriptionError : the file cannot be read or describes no robot; names file and line.
+    DescriptionError
+        The file cannot be read or describes no robot; the message names file and line.
     """
     return read_robot(source, keep_fixed=keep_fixed)[0]
 
@@ -42,9 +50,21 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False) -> Robot:
 def read_robot(
     source: str | Path, *, constants: Mapping[str, float] | None = None, nearly: float = 0.0, keep_fixed: bool = False
 ) -> tuple[Robot, tuple[str, ...]]:
-    """As `load_robot`, with notes on what of a foreign format was read otherwise than written, or not at all.
+    """The robot of a file as by `load_robot`, and notes on what of a foreign format was read otherwise than written, or not at all.
 
-    constants : values of the symbols of a `.par` file, which has no place for them.   nearly, keep_fixed : as `read_urdf`.
+    Parameters
+    ----------
+    source, keep_fixed
+        As of `load_robot`.
+    constants : mapping, SI and rad
+        Values of the symbols of a `.par` file, which has no place for them.
+    nearly : float, rad
+        As of `read_urdf`.
+
+    Raises
+    ------
+    DescriptionError
+        As by `load_robot`.
     """
     if source in packaged_robots():
         file = f"{source}.yaml"
@@ -67,7 +87,19 @@ def read_robot(
 def write_robot(robot: Robot, file: str, *, comments: Sequence[str] = ()) -> tuple[str, tuple[str, ...]]:
     """Text of `robot` in the format that the suffix of `file` names, and notes on what of it the format does not carry.
 
-    comments : lines at the top of a robot file (.yaml). Raises DescriptionError where the format would hold another mechanism.
+    Parameters
+    ----------
+    robot : Robot
+        What is written.
+    file : str
+        Name of the file, with one of the suffixes WRITTEN.
+    comments : sequence of str
+        Lines at the top of a robot file (.yaml).
+
+    Raises
+    ------
+    DescriptionError
+        The suffix is unknown, or the format would hold another mechanism.
     """
     suffix = Path(file).suffix.lower()
     if suffix not in WRITTEN:

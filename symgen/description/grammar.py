@@ -160,7 +160,7 @@ def parse(text: str | int | float, symbols: Iterable[str] | None = None) -> Expr
         text = repr(text)
     parser = _Parser(str(text), symbols)
     e = parser.sum()
-    kind, found, column = parser.tokens[parser.position]
+    kind, token, column = parser.tokens[parser.position]
     if kind != "end":
-        raise parser.error(f"unexpected {found!r} after a complete expression", column, unit_advice(found))
+        raise parser.error(f"unexpected {token!r} after a complete expression", column, unit_advice(token))
     return e

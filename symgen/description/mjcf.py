@@ -36,13 +36,18 @@ def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False) -> tuple[R
 
     Parameters
     ----------
-    content, file : bytes and name of the file.
-    keep_fixed : bodies without joints, and sites, are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else bodies are only
-        part of the body that holds them, to which their inertia belongs either way, and sites are left out.
+    content : bytes
+        Of the file.
+    file : str
+        Its name.
+    keep_fixed : bool
+        Bodies without joints, and sites, are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else such bodies are
+        only part of the body that holds them, and sites are left out. Their inertia belongs to that body either way.
 
     Raises
     ------
-    DescriptionError : no MJCF, or no tree of hinges and slides on a resting base; names file and line.
+    DescriptionError
+        No MJCF, or no tree of hinges and slides on a resting base; the message names file and line.
     """
     try:
         mjcf = reduced(content)
@@ -63,19 +68,33 @@ def _compiled(mjcf: Mjcf) -> Any:
     try:
         return mujoco.MjModel.from_xml_string(mjcf.text)
     except ValueError as error:
-        said = " ".join(str(error).split())
-        raise DescriptionError(f"MuJoCo refuses the file: {said.removeprefix('XML Error: ').removeprefix('Error: ')[:300]}") from error
+        message = " ".join(str(error).split())
+        raise DescriptionError(f"MuJoCo refuses the file: {message.removeprefix('XML Error: ').removeprefix('Error: ')[:300]}") from error
     finally:
         mujoco.set_mju_user_warning(before)
 
 
 @dataclass
 class _Growing:
-    """The tree as it grows: for each body its link, and the pose (4, 4) of the body in the frame of that link."""
+    """The tree as it grows.
+
+    Attributes
+    ----------
+    model : MjModel
+        What MuJoCo compiled.
+    mjcf : Mjcf
+        The reduced text and its lines.
+    names : list of str
+        Of the joints, in the order of the model.
+    links, bare, joints
+        As of `Tree`.
+    place : mapping
+        Link of each body, and pose (4, 4) of the body in the frame of that link.
+    """
 
     model: Any
     mjcf: Mjcf
-    names: list[str]  # of the joints
+    names: list[str]
     links: dict[str, Inertial | None] = field(default_factory=lambda: {"world": None})
     bare: set[str] = field(default_factory=set)
     joints: list[Joint] = field(default_factory=list)
@@ -189,7 +208,7 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
         limits |= {"lower": float(model.jnt_range[k][0]), "upper": float(model.jnt_range[k][1])}
     if model.jnt_actfrclimited[k]:
         limits["effort"] = float(np.abs(model.jnt_actfrcrange[k]).min())
-    found = Joint(
+    joint = Joint(
         name,
         "prismatic" if kind == SLIDE else "revolute",
         parent,
@@ -204,7 +223,7 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
         stiffness=float(model.jnt_stiffness[k]),
         rest=float(model.qpos_spring[int(model.jnt_qposadr[k])]),
     )
-    return found, np.linalg.inv(anchor)
+    return joint, np.linalg.inv(anchor)
 
 
 def _left_out(model: Any) -> list[str]:
@@ -232,11 +251,11 @@ def _left_out(model: Any) -> list[str]:
 def _relations(growing: _Growing) -> dict[str, Relation]:
     """The joints that linear relations determine, by the others: exact elimination of joints that no actuator drives."""
     model, names, driven = growing.model, growing.names, growing.mjcf.driven
-    found: dict[int, _Solved] = {}
+    relations: dict[int, _Solved] = {}
     for e in range(model.neq):
         row, right = _equation(model, e)
-        for k in sorted(row.keys() & found.keys()):
-            row, right = _without(row, right, k, found[k])
+        for k in sorted(row.keys() & relations.keys()):
+            row, right = _without(row, right, k, relations[k])
         free = [k for k in sorted(row) if names[k] not in driven]
         if not free:
             raise DescriptionError(f"equality {model.equality(e).name!r}: it ties driven joints, or says what others say already")
@@ -244,11 +263,12 @@ def _relations(growing: _Growing) -> dict[str, Relation]:
         pivot = first if int(model.eq_type[e]) == JOINT_RELATION and first in free else free[-1]
         own = row.pop(pivot)
         solved = ({k: -c / own for k, c in row.items()}, right / own)
-        found = {
-            k: (_with(leaders, offset, pivot, solved) if pivot in leaders else (leaders, offset)) for k, (leaders, offset) in found.items()
+        relations = {
+            k: (_with(leaders, offset, pivot, solved) if pivot in leaders else (leaders, offset))
+            for k, (leaders, offset) in relations.items()
         }
-        found[pivot] = solved
-    return {names[k]: Relation({names[i]: c for i, c in leaders.items()}, offset) for k, (leaders, offset) in sorted(found.items())}
+        relations[pivot] = solved
+    return {names[k]: Relation({names[i]: c for i, c in leaders.items()}, offset) for k, (leaders, offset) in sorted(relations.items())}
 
 
 def _with(row: _Row, offset: Fraction, k: int, solved: _Solved) -> _Solved:

@@ -45,11 +45,27 @@ IGNORED = ("actuator", "asset", "contact", "custom", "deformable", "keyframe", "
 
 @dataclass
 class Mjcf:
-    """Name of the model and the reduced text; lines of the joints in the order of the file, names of driven joints, and what was left out."""
+    """What an MJCF file says of its mechanism.
+
+    Attributes
+    ----------
+    name, text : str
+        Of the model, and the reduced file.
+    weightless : bool
+        Whether gravity is switched off.
+    joints : list of int
+        Line of each joint, in the order of the file.
+    bodies : int
+        Their number.
+    driven : frozenset of str
+        Names of the joints that an actuator drives.
+    notes : tuple of str
+        What was left out.
+    """
 
     name: str
     text: str = ""
-    weightless: bool = False  # gravity is switched off
+    weightless: bool = False
     joints: list[int] = field(default_factory=list)
     bodies: int = 0
     driven: frozenset[str] = frozenset()
@@ -68,12 +84,12 @@ def reduced(content: bytes) -> Mjcf:
     for e in (e for e in root.children if e.tag == "compiler"):
         if e.number("settotalmass", "-1") > 0:
             raise DescriptionError("settotalmass is not read; write the masses out, as MuJoCo's saved XML does", line=e.line)
-    found = Mjcf(root.attributes.get("model", ""))
+    mjcf = Mjcf(root.attributes.get("model", ""))
     always = any(e.attributes.get("inertiafromgeom") == "true" for e in root.children if e.tag == "compiler")
     parts = [_open(root, KEPT["mujoco"])]
     for e in (e for section in SECTIONS for e in root.children if e.tag == section):
         if e.tag == "worldbody":
-            parts += ["<worldbody>", *_inside(e, found, moves=False, weighed=False, always=always), "</worldbody>"]
+            parts += ["<worldbody>", *_inside(e, mjcf, moves=False, weighed=False, always=always), "</worldbody>"]
         elif e.tag == "equality":
             parts += ["<equality>", *_relations(e), "</equality>"]
         elif e.tag == "tendon":
@@ -82,19 +98,19 @@ def reduced(content: bytes) -> Mjcf:
             parts += _default(e)
         else:
             parts.append(_open(e, KEPT[e.tag], end="/"))
-    found.text = "".join([*parts, "</mujoco>"])
+    mjcf.text = "".join([*parts, "</mujoco>"])
     flags = {
         key: value for e in root.children if e.tag == "option" for x in e.children if x.tag == "flag" for key, value in x.attributes.items()
     }
-    found.weightless = flags.pop("gravity", "enable") == "disable"
+    mjcf.weightless = flags.pop("gravity", "enable") == "disable"
     driven = (x for e in root.children if e.tag == "actuator" for x in e.children)
-    found.driven = frozenset(name for x in driven for key in ("joint", "jointinparent") if (name := x.attributes.get(key)))
+    mjcf.driven = frozenset(name for x in driven for key in ("joint", "jointinparent") if (name := x.attributes.get(key)))
     left = [f"<{tag}>" for tag in sorted({e.tag for e in root.children} & set(IGNORED))]
     left += [f"flag {key[:30]}" for key, value in sorted(flags.items()) if value != "enable"]
-    found.notes = (f"not read: {', '.join(left)}",) if left else ()
+    mjcf.notes = (f"not read: {', '.join(left)}",) if left else ()
     if unknown := sorted({e.tag for e in root.children} - set(SECTIONS) - set(IGNORED)):
         raise DescriptionError(f"<{unknown[0][:40]}> is no part of an MJCF file", line=root.line)
-    return found
+    return mjcf
 
 
 def _every(e: Element) -> Iterator[Element]:
@@ -121,16 +137,16 @@ def _default(e: Element) -> list[str]:
     return [*parts, "</default>"]
 
 
-def _inside(e: Element, found: Mjcf, *, moves: bool, weighed: bool, always: bool) -> list[str]:
+def _inside(e: Element, mjcf: Mjcf, *, moves: bool, weighed: bool, always: bool) -> list[str]:
     """What stands in a body, a frame or the world; `weighed`: its geoms tell its mass, `always`: those of every body that moves."""
     parts: list[str] = []
     for child in e.children:
         if child.tag == "body":
-            parts += _body(child, found, moves=moves, always=always)
+            parts += _body(child, mjcf, moves=moves, always=always)
         elif child.tag == "frame":
-            parts += [_open(child, KEPT["frame"]), *_inside(child, found, moves=moves, weighed=weighed, always=always), "</frame>"]
+            parts += [_open(child, KEPT["frame"]), *_inside(child, mjcf, moves=moves, weighed=weighed, always=always), "</frame>"]
         elif child.tag in ("joint", "freejoint"):
-            found.joints.append(child.line)
+            mjcf.joints.append(child.line)
             parts.append(_open(child, KEPT[child.tag], end="/"))
         elif child.tag in ("inertial", "site") or (child.tag == "geom" and weighed):
             if child.tag == "geom" and any(key in child.attributes for key in ("mesh", "hfield")):
@@ -139,22 +155,22 @@ def _inside(e: Element, found: Mjcf, *, moves: bool, weighed: bool, always: bool
     return parts
 
 
-def _body(e: Element, found: Mjcf, *, moves: bool, always: bool) -> list[str]:
-    found.bodies += 1
-    if found.bodies > MAX_BODIES:
+def _body(e: Element, mjcf: Mjcf, *, moves: bool, always: bool) -> list[str]:
+    mjcf.bodies += 1
+    if mjcf.bodies > MAX_BODIES:
         raise DescriptionError(f"more than {MAX_BODIES} bodies", line=e.line)
-    here = {child.tag for child in _here(e)}
-    moves = moves or bool(here & {"joint", "freejoint"})
-    inside = _inside(e, found, moves=moves, weighed=moves and (always or "inertial" not in here), always=always)
+    tags = {child.tag for child in _own(e)}
+    moves = moves or bool(tags & {"joint", "freejoint"})
+    inside = _inside(e, mjcf, moves=moves, weighed=moves and (always or "inertial" not in tags), always=always)
     return [_open(e, KEPT["body"]), *inside, "</body>"]
 
 
-def _here(e: Element) -> Iterator[Element]:
+def _own(e: Element) -> Iterator[Element]:
     """Children of a body, those inside its frames too."""
     for child in e.children:
         yield child
         if child.tag == "frame":
-            yield from _here(child)
+            yield from _own(child)
 
 
 def _relations(e: Element) -> list[str]:

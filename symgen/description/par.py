@@ -29,7 +29,7 @@ NEARLY = 1e-5  # rad: a decimal angle this close to a multiple of pi/12 is read 
 
 GEOMETRIC = ("ant", "sigma", "b", "d", "r", "gamma", "alpha", "mu", "theta")
 COUNTS = ("NF", "NL", "NJ", "Type", "is_mobile")
-FAMILIES = {**{name: name for name in INERTIAL}, "IA": "Ia", "FV": "FV", "FS": "FS"}  # name there: name here
+FAMILIES = {**{name: name for name in INERTIAL}, "IA": "Ia", "FV": "FV", "FS": "FS"}  # name in the file: family
 WRENCH = ("FX", "FY", "FZ", "CX", "CY", "CZ")
 BASE_MOTION = ("W0", "WP0", "V0", "VP0")
 NAMES_ONLY = ("QP", "QDP", "GAM")  # names of rates, accelerations and torques: nothing of the mechanism
@@ -41,11 +41,23 @@ _IDENTITY = "1000010000100001"
 
 @dataclass
 class _Par:
-    """Texts of a file with their lines."""
+    """Texts of a file with their lines.
+
+    Attributes
+    ----------
+    name : str
+        Of the robot, from a comment.
+    lists : mapping
+        Entries of each key, with their lines.
+    numbers : mapping
+        Tables of the comments: constants, values, start 1, ...
+    notes : list of str
+        What was read otherwise than written.
+    """
 
     name: str = ""
     lists: dict[str, list[tuple[str, int]]] = field(default_factory=dict)
-    numbers: dict[str, dict[str, float]] = field(default_factory=dict)  # of the comments: constants, values, start 1
+    numbers: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     def line(self, path: Path) -> int:
@@ -61,12 +73,17 @@ def read_par(content: bytes, file: str, constants: Mapping[str, float] | None = 
 
     Parameters
     ----------
-    content, file : bytes and name of the file.
-    constants : values of the geometric symbols and of gravity, SI; they stand before those of a comment in the file.
+    content : bytes
+        Of the file.
+    file : str
+        Its name.
+    constants : mapping, SI and rad
+        Values of the geometric symbols and of gravity; they stand before those of a comment in the file.
 
     Raises
     ------
-    DescriptionError : no `.par` file, no robot, or a symbol without value; names file and line.
+    DescriptionError
+        No `.par` file, no robot, or a symbol without value; the message names file and line.
     """
     par = _Par()
     try:
@@ -283,10 +300,10 @@ def _parameters(par: _Par, NL: int, fixed: set[int]) -> tuple[dict[str, float], 
     values: dict[str, float] = {}
     zero: dict[str, set[int]] = {}
     renamed: list[str] = []
-    for there, family in FAMILIES.items():
-        default = there + "{}" if there in INERTIAL else "0"
+    for key, family in FAMILIES.items():
+        default = key + "{}" if key in INERTIAL else "0"
         zero[family] = set()
-        for j, item in enumerate(_list(par, there, NL, default), start=1):
+        for j, item in enumerate(_list(par, key, NL, default), start=1):
             e, name = _expression(*item), parameter(family, j)
             if not e:
                 zero[family].add(j)

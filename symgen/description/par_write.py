@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from symgen.description.expression import ONE, Expression
+from symgen.description.expression import Expression
 from symgen.description.par import FAMILIES, GEOMETRIC, NAMES_ONLY, WRENCH
-from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Robot, parameter
+from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Robot, one_joint_parameters, parameter
 from symgen.errors import DescriptionError
-
-_CARRIED = {"Ia": "inertia", "FV": "viscous", "FS": "coulomb"}
 
 
 def write_par(robot: Robot) -> tuple[str, tuple[str, ...]]:
@@ -23,11 +21,12 @@ def write_par(robot: Robot) -> tuple[str, tuple[str, ...]]:
     NJ, NL = NF - cuts, NF - 2 * cuts
     _check(robot, NL, NJ)
     columns = {key: [_geometric(robot, j, key) for j in range(1, NF + 1)] for key in GEOMETRIC}
-    carried = {name for name in _carried(robot) if int(re.sub(r"\D", "", name)) <= NL}
+    inertial = {parameter(p, j) for j in robot.links for p in INERTIAL}
+    written = {name for name in inertial | one_joint_parameters(robot, ("Ia", "FV", "FS")) if int(re.sub(r"\D", "", name)) <= NL}
     lines = [
         f"(* Robotname = '{robot.name}' *)",
         *_numbers("constants", robot.constants),
-        *_numbers("values", {name: value for name, value in robot.values.items() if name in carried}),
+        *_numbers("values", {name: value for name, value in robot.values.items() if name in written}),
         *(
             line
             for k, loop in enumerate(robot.loops, start=1)
@@ -43,7 +42,7 @@ def write_par(robot: Robot) -> tuple[str, tuple[str, ...]]:
         *(_row(key, column) for key, column in columns.items()),
         "",
         "(* Dynamic parameters and external forces *)",
-        *(_row(there, (_symbol(there, here, j, carried) for j in range(1, NL + 1))) for there, here in FAMILIES.items()),
+        *(_row(name, (_symbol(name, family, j, written) for j in range(1, NL + 1))) for name, family in FAMILIES.items()),
         *(_row(key, ["0"] * NL) for key in WRENCH),
         "",
         "(* Joint parameters *)",
@@ -60,7 +59,7 @@ def write_par(robot: Robot) -> tuple[str, tuple[str, ...]]:
         "",
         "(* End of definition *)",
     ]
-    return "\n".join(lines) + "\n", _losses(robot, carried)
+    return "\n".join(lines) + "\n", _losses(robot, written)
 
 
 def _check(robot: Robot, NL: int, NJ: int) -> None:
@@ -99,22 +98,13 @@ def _numbers(what: str, table: Mapping[str, float]) -> list[str]:
     return [f"(* {what}: " + ", ".join(f"{name} = {value!r}" for name, value in table.items()) + " *)"] if table else []
 
 
-def _symbol(there: str, here: str, j: int, carried: set[str]) -> str:
-    return f"{there}{j}" if parameter(here, j) in carried else "0"
+def _symbol(name: str, family: str, j: int, written: set[str]) -> str:
+    return f"{name}{j}" if parameter(family, j) in written else "0"
 
 
-def _carried(robot: Robot) -> set[str]:
-    """Parameters with a place: inertial ones, and Ia, FV, FS that act on one joint alone."""
-    names = {parameter(p, j) for j in robot.links for p in INERTIAL}
-    for e in robot.elements:
-        if _CARRIED.get(e.family) == e.kind and e.when is None:
-            names |= {parameter(e.family, j) for j, row in e.along.items() if row == {j: ONE}}
-    return names
-
-
-def _losses(robot: Robot, carried: set[str]) -> tuple[str, ...]:
+def _losses(robot: Robot, written: set[str]) -> tuple[str, ...]:
     notes = []
-    if lost := [name for name in robot.parameters if name not in carried]:
+    if lost := [name for name in robot.parameters if name not in written]:
         notes.append(f"parameters without a place in the format, left out: {', '.join(lost)}")
     notes += [f"{what} not carried" for what in ("title", "source", "drives", "limits") if getattr(robot, what)]
     if robot.constants or robot.values or any(loop.start for loop in robot.loops):

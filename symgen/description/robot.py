@@ -14,14 +14,14 @@ of the link frame, MX MY MZ = M (centre of mass). SI and rad.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
 from symgen.description import checks
 from symgen.description.checks import check_identifier
-from symgen.description.expression import Expression
+from symgen.description.expression import ONE, Expression
 from symgen.description.parts import (
     DIRECTIONS,
     FIXED,
@@ -30,6 +30,7 @@ from symgen.description.parts import (
     KINDS,
     PRISMATIC,
     REVOLUTE,
+    USUAL_KINDS,
     Drives,
     Element,
     Form,
@@ -58,6 +59,7 @@ __all__ = [
     "Robot",
     "Row",
     "check_identifier",
+    "one_joint_parameters",
     "parameter",
 ]
 
@@ -180,10 +182,6 @@ class Robot:
                 names += [parameter(e.family, j) for j in e.keys]
         return tuple(names)
 
-    def children(self, i: int) -> tuple[int, ...]:
-        """Numbers of the frames whose antecedent is frame i."""
-        return tuple(f.j for f in self.frames if f.ant == i)
-
     def path(self, j: int) -> tuple[int, ...]:
         """Frames from the base to j, j included."""
         frames: list[int] = []
@@ -191,3 +189,14 @@ class Robot:
             frames.insert(0, j)
             j = self.frame(j).ant
         return tuple(frames)
+
+
+def one_joint_parameters(robot: Robot, families: Collection[str]) -> set[str]:
+    """Names of the parameters of `families`, such as FV, that act on one joint alone, in both directions, as other formats mean them."""
+    return {
+        parameter(e.family, j)
+        for e in robot.elements
+        if e.family in families and e.kind == USUAL_KINDS.get(e.family) and e.when is None
+        for j, row in e.along.items()
+        if row == {j: ONE}
+    }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -17,7 +17,17 @@ MOVING, FIXED_TYPE = ("revolute", "continuous", "prismatic"), "fixed"
 
 @dataclass(frozen=True)
 class Inertial:
-    """M, kg; pose (4, 4) of the centre-of-mass frame in the link frame; I (3, 3) about that point, kg m^2, tensor elements."""
+    """Mass and inertia of a link.
+
+    Attributes
+    ----------
+    M : float, kg
+        Mass.
+    pose : ndarray, shape (4, 4)
+        Frame at the centre of mass, in the link frame.
+    I : ndarray, shape (3, 3), kg m^2
+        Tensor elements about the centre of mass, in that frame.
+    """
 
     M: float
     pose: Array
@@ -26,9 +36,26 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: `pose` (4, 4) of its frame in that of the parent link, unit `axis` in the joint frame; child link frame = joint frame at 0.
+    """A joint; along it, torque or force Gamma += armature qdd + damping qd + friction sign(qd) + stiffness (q - rest).
 
-    Along the joint, torque or force Gamma += armature qdd + damping qd + friction sign(qd) + stiffness (q - rest).
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    kind : str
+        One of MOVING, or FIXED_TYPE.
+    parent, child : str
+        Names of the links; the frame of `child` is the joint frame at q = 0.
+    pose : ndarray, shape (4, 4)
+        Joint frame in the frame of `parent`.
+    axis : ndarray, shape (3,)
+        Unit vector in the joint frame.
+    line : int
+        Of the file.
+    limits : mapping, SI and rad
+        Among lower, upper, velocity and effort.
+    damping, friction, armature, stiffness, rest : float, SI and rad
+        As above.
     """
 
     name: str
@@ -56,14 +83,34 @@ class Relation:
 
 @dataclass(frozen=True)
 class Tree:
-    """Links by name and joints, both in the order of the file; the link that has no parent; the joints that follow others, by name."""
+    """Links and joints of a robot, in the order of the file.
+
+    Attributes
+    ----------
+    name : str
+        Of the robot.
+    links : mapping
+        Inertial of each link, None where the file has none.
+    joints : tuple of Joint
+        One for each link but the root.
+    root : str
+        The link that has no parent.
+    relations : mapping
+        Relations of the joints that follow others, by name.
+    bare : frozenset of str
+        Links between the joints of one body, which have no mass.
+    gravity : tuple of float, m/s^2
+        Acceleration of gravity in the root link.
+    notes : tuple of str
+        What was not read.
+    """
 
     name: str
     links: Mapping[str, Inertial | None]
     joints: tuple[Joint, ...]
     root: str
     relations: Mapping[str, Relation] = field(default_factory=dict)
-    bare: frozenset[str] = frozenset()  # links between the joints of one body, which have no mass
+    bare: frozenset[str] = frozenset()
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
     notes: tuple[str, ...] = ()
 
@@ -76,3 +123,14 @@ def turn(axis: int, angle: float) -> Array:
     R = np.eye(3)
     R[j, j], R[j, k], R[k, j], R[k, k] = c, -s, s, c
     return R
+
+
+def transform(row: Sequence[float]) -> Array:
+    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) of a row gamma, b, alpha, d, theta, r; (4, 4)."""
+    gamma, b, alpha, d, theta, r = row
+    T = np.eye(4)
+    for axis, angle, shift in ((2, gamma, b), (0, alpha, d), (2, theta, r)):
+        step = np.eye(4)
+        step[:3, :3], step[axis, 3] = turn(axis, angle), shift
+        T = T @ step
+    return T

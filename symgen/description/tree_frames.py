@@ -20,7 +20,7 @@ import numpy as np
 
 from symgen.description.expression import PI, ZERO, Expression, twelfths
 from symgen.description.robot import FIXED, PRISMATIC, REVOLUTE, Frame
-from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree, turn
+from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree, transform
 
 DIGITS = 13  # decimals kept of lengths (m) and angles (rad)
 SAME = 1e-12  # m, rad: closer is equal
@@ -29,7 +29,15 @@ STEEP = 0.02  # sine of the angle of two axes below which their common normal is
 
 @dataclass
 class Body:
-    """Body j while its frame is placed: links with their poses in it, joints it carries with the poses of their parent links."""
+    """Body j while its frame is placed.
+
+    Attributes
+    ----------
+    links : mapping
+        Pose (4, 4) of each of its links in frame j.
+    joints : list
+        Joints on it, each with the pose of its parent link in frame j.
+    """
 
     links: dict[str, Array]
     joints: list[tuple[Joint, Array]]
@@ -37,7 +45,21 @@ class Body:
 
 @dataclass
 class Table:
-    """The table as it grows: frames, values of the constants, joints and bodies by frame number, kept links by frame number."""
+    """The table as it grows.
+
+    Attributes
+    ----------
+    tree : Tree
+        What is turned into the table.
+    frames : list of Frame
+        Rows so far.
+    constants : mapping, m
+        Lengths by name.
+    joint, bodies, kept : mapping
+        Joint, body and kept link by frame number.
+    notes : list of str
+        What a reader should know of the table.
+    """
 
     tree: Tree
     frames: list[Frame] = field(default_factory=list)
@@ -52,11 +74,11 @@ def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
     """Frames of all bodies, a body before what it carries, branch by branch; then those of the links that fixed joints hold, if kept."""
     table = Table(tree)
     table.bodies[0] = _body(tree, tree.root, np.eye(4))
-    waiting = [(0, *carried) for carried in reversed(table.bodies[0].joints)]
+    waiting = [(0, joint, parent) for joint, parent in reversed(table.bodies[0].joints)]
     while waiting:
         ant, joint, parent = waiting.pop()
         j = _add(table, ant, joint, parent)
-        waiting += [(j, *carried) for carried in reversed(table.bodies[j].joints)]
+        waiting += [(j, child, link) for child, link in reversed(table.bodies[j].joints)]
     if keep_fixed:
         for j, body in table.bodies.items():
             for name, pose in list(body.links.items())[1:]:
@@ -70,7 +92,7 @@ def _keep(table: Table, ant: int, name: str, pose: Array) -> None:
         to_aside, ant = _row(table, ant, FIXED, _normal(np.array([1.0, 0.0, 0.0]), pose[:3, 3]))
         pose = np.linalg.inv(to_aside) @ pose
     before = _numbered(_normal(pose[:3, 2], pose[:3, 3]))
-    rest = np.linalg.inv(_transform((*before, 0.0, 0.0))) @ pose
+    rest = np.linalg.inv(transform((*before, 0.0, 0.0))) @ pose
     theta, r = _numbered((math.atan2(rest[1, 0], rest[0, 0]), rest[2, 3]))
     _, j = _row(table, ant, FIXED, before, theta, r)
     table.kept[j] = name
@@ -88,7 +110,7 @@ def _body(tree: Tree, link: str, pose: Array) -> Body:
             else:
                 body.joints.append((joint, body.links[link]))
     order = {joint.name: k for k, joint in enumerate(tree.joints)}
-    body.joints.sort(key=lambda carried: order[carried[0].name])
+    body.joints.sort(key=lambda held: order[held[0].name])
     return body
 
 
@@ -105,18 +127,18 @@ def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
         pose = np.linalg.inv(to_aside) @ pose
         axis, point, ant = pose[:3, :3] @ joint.axis, pose[:3, 3], aside
     before = _numbered(_normal(axis, point))
-    body = _body(table.tree, joint.child, np.linalg.inv(_transform((*before, 0.0, 0.0))) @ pose)
+    body = _body(table.tree, joint.child, np.linalg.inv(transform((*before, 0.0, 0.0))) @ pose)
     theta = r = 0.0
     if body.joints:
         first, link = body.joints[0]
-        carried = link @ first.pose
-        along = carried[:3, :3] @ first.axis
+        placed_joint = link @ first.pose
+        along = placed_joint[:3, :3] @ first.axis
         if not _nearly_parallel(along):
-            theta, r, _, _ = _normal(along, carried[:3, 3])
+            theta, r, _, _ = _normal(along, placed_joint[:3, 3])
             theta, r = _numbered((theta, r))
     sigma = PRISMATIC if joint.kind == "prismatic" else REVOLUTE
     _, j = _row(table, ant, sigma, before, theta, r)
-    own = np.linalg.inv(_transform((0.0, 0.0, 0.0, 0.0, theta, r)))
+    own = np.linalg.inv(transform((0.0, 0.0, 0.0, 0.0, theta, r)))
     table.bodies[j] = Body({name: own @ X for name, X in body.links.items()}, [(held, own @ X) for held, X in body.joints])
     table.joint[j] = joint
     return j
@@ -141,17 +163,6 @@ def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
     if abs(gamma) > math.pi / 2 + SAME:  # the same normal, x the other way
         gamma, alpha, d = gamma - math.copysign(math.pi, gamma), -alpha, -d
     return gamma, b, alpha, d
-
-
-def _transform(row: Sequence[float]) -> Array:
-    """Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), (4, 4)."""
-    gamma, b, alpha, d, theta, r = row
-    T = np.eye(4)
-    for axis, angle, shift in ((2, gamma, b), (0, alpha, d), (2, theta, r)):
-        step = np.eye(4)
-        step[:3, :3], step[axis, 3] = turn(axis, angle), shift
-        T = T @ step
-    return T
 
 
 def _numbered(row: Sequence[float]) -> tuple[float, ...]:
@@ -188,11 +199,11 @@ def _row(table: Table, ant: int, sigma: int, before: Sequence[float], theta: flo
             r=moved + q if sigma == PRISMATIC else moved,
         )
     )
-    return _transform((*before, theta, r)), j
+    return transform((*before, theta, r)), j
 
 
 def _length(table: Table, name: str, x: float) -> Expression:
-    """0, or a constant of this value, the one that is there already if it is equal."""
+    """0, or a constant of this value: an earlier one if it is equal."""
     if abs(x) <= SAME:
         return ZERO
     known = next((k for k, value in table.constants.items() if abs(abs(value) - abs(x)) <= SAME), None)

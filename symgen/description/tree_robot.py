@@ -47,7 +47,7 @@ def robot_of_tree(tree: Tree, file: str, sha256: str, *, keep_fixed: bool = Fals
 
 
 def _legend(what: str, names: dict[str, str]) -> str:
-    return f"{what}: " + ", ".join(f"{here} = {there!a:.60}" for here, there in names.items())
+    return f"{what}: " + ", ".join(f"{name} = {of_file!a:.60}" for name, of_file in names.items())
 
 
 def _robot(table: Table, file: str, sha256: str) -> Robot:
@@ -94,13 +94,13 @@ def _gravity(g: tuple[float, float, float]) -> tuple[tuple[Expression, Expressio
 def _constraints(table: Table) -> dict[int, Expression]:
     """q_j of the joints that follow others."""
     number = {joint.name: j for j, joint in table.joint.items()}
-    found: dict[int, Expression] = {}
+    constraints: dict[int, Expression] = {}
     for name, relation in table.tree.relations.items():
-        found[number[name]] = sum(
+        constraints[number[name]] = sum(
             (Expression.symbol(f"q{number[leader]}") * factor for leader, factor in relation.leaders.items()),
             start=Expression.number(Fraction(relation.offset)),
         )
-    return dict(sorted(found.items()))
+    return dict(sorted(constraints.items()))
 
 
 def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
@@ -112,17 +112,17 @@ def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
 def _limits(table: Table, actuated: list[int]) -> dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]]:
     """Limits that every actuated joint has; a kind that one joint lacks is left out and noted."""
     rows = [table.joint[j] for j in actuated]
-    found: dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = {}
+    limits: dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = {}
     bounds = tuple((joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)) for joint in rows)
     if all(low < high for low, high in bounds) and all(joint.kind != "continuous" for joint in rows):
-        found["q"] = bounds
-    for here, there in (("qd", "velocity"), ("tau", "effort")):
-        largest = tuple(joint.limits.get(there, 0.0) for joint in rows)
+        limits["q"] = bounds
+    for key, of_file in (("qd", "velocity"), ("tau", "effort")):
+        largest = tuple(joint.limits.get(of_file, 0.0) for joint in rows)
         if all(x > 0 for x in largest):
-            found[here] = largest
-    if missing := [key for key in ("q", "qd", "tau") if key not in found]:
+            limits[key] = largest
+    if missing := [key for key in ("q", "qd", "tau") if key not in limits]:
         table.notes.append(f"limits of {', '.join(missing)} left out: not every actuated joint has them")
-    return found
+    return limits
 
 
 def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozenset[int]]:

@@ -1,13 +1,26 @@
-"""URDF to a Robot: the text (`urdf_text`) becomes a tree, the tree a table of Khalil frames (`tree_frames`) with values (`tree_robot`)."""
+"""URDF to a Robot: the text becomes a tree of links and joints, the tree a table of Khalil frames (`tree_frames`) with values (`tree_robot`).
+
+Numbers are read as they stand; meshes, textures and packages are never opened. A URDF library would load them, and its XML parser expands
+entities (`xml_text` reads neither). Every error names its line.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import math
+import sys
+from fractions import Fraction
 
+import numpy as np
+
+from symgen.description.expression import twelfths
 from symgen.description.robot import Robot
+from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, MOVING, Inertial, Joint, Relation, Tree, turn
 from symgen.description.tree_robot import robot_of_tree
-from symgen.description.urdf_text import parse_urdf
+from symgen.description.xml_text import LARGEST, Array, Element, read_elements
 from symgen.errors import DescriptionError
+
+Mimic = tuple[str, float, float]  # joint, multiplier, offset
 
 
 def read_urdf(content: bytes, file: str, *, nearly: float = 0.0, keep_fixed: bool = False) -> tuple[Robot, tuple[str, ...]]:
@@ -15,16 +28,152 @@ def read_urdf(content: bytes, file: str, *, nearly: float = 0.0, keep_fixed: boo
 
     Parameters
     ----------
-    content, file : bytes and name of the file.
-    nearly : rad; angles of the file this close to a multiple of pi/12 are taken as that, 1e-4 for files that say 1.5708.
-    keep_fixed : links held by fixed joints (tool0, flange) are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else they
-        are only part of the body that holds them, to which their inertia belongs either way.
+    content : bytes
+        Of the file.
+    file : str
+        Its name.
+    nearly : float, rad
+        Angles of the file this close to a multiple of pi/12 are taken as that: 1e-4 for files that say 1.5708.
+    keep_fixed : bool
+        Links held by fixed joints (tool0, flange) are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else they
+        are only part of the body that holds them. Their inertia belongs to that body either way.
 
     Raises
     ------
-    DescriptionError : no URDF, or no tree of revolute, prismatic and fixed joints; names file and line.
+    DescriptionError
+        No URDF, or no tree of revolute, prismatic and fixed joints; the message names file and line.
     """
     try:
         return robot_of_tree(parse_urdf(content, nearly), file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
     except DescriptionError as error:
         raise DescriptionError(error.message, path=error.path, file=file, line=error.line or 1) from error.__cause__
+
+
+def parse_urdf(content: bytes, nearly: float = 0.0) -> Tree:
+    """Links and joints of a URDF file; roll, pitch and yaw within `nearly` (rad) of a multiple of pi/12 are taken as that."""
+    root = read_elements(content)
+    if root.tag != "robot":
+        raise DescriptionError(f"found <{root.tag[:40]}>; expected <robot>", line=root.line)
+    links: dict[str, Inertial | None] = {}
+    joints: list[Joint] = []
+    mimics: dict[str, Mimic] = {}
+    for e in root.children:
+        if e.tag == "link":
+            if (name := e.text("name")) in links:
+                raise DescriptionError(f"link {name!r} is given twice; keep one", line=e.line)
+            links[name] = _inertial(e, nearly)
+        elif e.tag == "joint":
+            joints.append(_joint(e, nearly))
+            if joints[-1].kind != FIXED_TYPE and (mimic := e.first("mimic")) is not None:
+                mimics[joints[-1].name] = (mimic.text("joint"), mimic.number("multiplier", "1"), mimic.number("offset", "0"))
+    if len(joints) > MAX_JOINTS:
+        raise DescriptionError(f"{len(joints)} joints; at most {MAX_JOINTS} are read", line=root.line)
+    base = _root(links, joints, root.line)
+    other = sorted({e.tag for e in root.children} - {"link", "joint", "material"})
+    notes: tuple[str, ...] = (f"not read: {', '.join(f'<{tag}>' for tag in other)}",) if other else ()
+    points = [e.text("name") for e in root.children if e.tag == "link" and (own := e.first("inertial")) and own.first("inertia") is None]
+    notes += (f"no <inertia>, taken as point masses: {', '.join(f'{name!a:.60}' for name in points)}",) if points else ()
+    return Tree(root.attributes.get("name", ""), links, tuple(joints), base, _relations(joints, mimics), notes=notes)
+
+
+def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Relation]:
+    """q = multiplier q_leader + offset of the joints that mimic another, through any that follow each other."""
+    moving = {joint.name for joint in joints if joint.kind != FIXED_TYPE}
+    relations: dict[str, Relation] = {}
+    for joint in (joint for joint in joints if joint.name in mimics):
+        leader, multiplier, offset, followed = joint.name, Fraction(1), Fraction(0), {joint.name}
+        while leader in mimics:
+            leader, factor, shift = mimics[leader]
+            if leader in followed or leader not in moving:
+                what = (
+                    "joints follow each other in a circle" if leader in followed else f"there is no moving joint {leader[:60]!r} to follow"
+                )
+                raise DescriptionError(f"joint {joint.name!r}: {what}", line=joint.line)
+            followed.add(leader)
+            offset += multiplier * Fraction(repr(shift))
+            multiplier *= Fraction(repr(factor))
+        relations[joint.name] = Relation({leader: multiplier}, offset)
+    return relations
+
+
+def _pose(e: Element | None, nearly: float) -> Array:
+    """(4, 4) of an <origin>: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    T = np.eye(4)
+    if e is not None:
+        roll, pitch, yaw = (snapped(x, nearly) for x in e.numbers("rpy", 3, "0 0 0"))
+        T[:3, :3] = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
+        T[:3, 3] = e.numbers("xyz", 3, "0 0 0")
+    return T
+
+
+def snapped(angle: float, nearly: float) -> float:
+    """`angle`, or the multiple of pi/12 within `nearly` of it."""
+    k = twelfths(angle, nearly)
+    return angle if k is None else k * (math.pi / 12)
+
+
+def _inertial(link: Element, nearly: float) -> Inertial | None:
+    e = link.first("inertial")
+    if e is None:
+        return None
+    mass, inertia = e.first("mass"), e.first("inertia")
+    if mass is None:
+        raise DescriptionError("<inertial> needs <mass>", line=e.line)
+    M = mass.number("value")
+    if M < 0:
+        raise DescriptionError(f"mass {M}; expected 0 or more", line=mass.line)
+    if inertia is None:  # a point mass: programs that read URDF say so and go on
+        return Inertial(M, _pose(e.first("origin"), nearly), np.zeros((3, 3)))
+    xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    return Inertial(M, _pose(e.first("origin"), nearly), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+
+
+def _joint(e: Element, nearly: float) -> Joint:
+    kind, name = e.text("type"), e.text("name")
+    if kind not in (*MOVING, FIXED_TYPE):
+        raise DescriptionError(f"joint {name!r} is {kind[:30]!r}; expected {', '.join(MOVING)} or {FIXED_TYPE}", line=e.line)
+    ends = {tag: child for tag in ("parent", "child") if (child := e.first(tag)) is not None}
+    if len(ends) < 2:
+        raise DescriptionError(f"joint {name!r} needs <parent link=...> and <child link=...>", line=e.line)
+    given = e.first("axis")
+    axis = np.array([1.0, 0.0, 0.0]) if given is None else given.numbers("xyz", 3, "1 0 0")
+    length = float(np.linalg.norm(axis))
+    if kind == FIXED_TYPE:
+        axis, length = np.array([0.0, 0.0, 1.0]), 1.0  # of no meaning; some files say 0 0 0
+    if length < 1e-6:
+        raise DescriptionError(f"joint {name!r}: axis {axis.tolist()} has no direction", line=(given or e).line)
+    limit, dynamics = e.first("limit"), e.first("dynamics")
+    keys = ("lower", "upper", "velocity", "effort")
+    bounds = {key: limit.number(key, largest=sys.float_info.max) for key in keys if key in limit.attributes} if limit is not None else {}
+    limits = {key: x for key, x in bounds.items() if abs(x) <= LARGEST}  # some files say 1e16 for none
+    damping, friction = (0.0 if dynamics is None else dynamics.number(key, "0") for key in ("damping", "friction"))
+    axis = axis if abs(length - 1) < 1e-15 else axis / length
+    return Joint(name, kind, ends["parent"].text("link"), ends["child"].text("link"), _pose(e.first("origin"), nearly), axis, e.line,
+                 limits, damping, friction)  # fmt: skip
+
+
+def _root(links: dict[str, Inertial | None], joints: list[Joint], line: int) -> str:
+    """The one link without parent; every other must hang on it by one joint."""
+    parent: dict[str, str] = {}
+    names: set[str] = set()
+    for joint in joints:
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise DescriptionError(f"joint {joint.name!r}: there is no link {link[:60]!r}", line=joint.line)
+        if joint.child in parent:
+            raise DescriptionError(f"joint {joint.name!r}: link {joint.child!r} has a parent already; a URDF is a tree", line=joint.line)
+        if joint.name in names:
+            raise DescriptionError(f"joint {joint.name!r} is given twice; keep one", line=joint.line)
+        names.add(joint.name)
+        parent[joint.child] = joint.parent
+    roots = [link for link in links if link not in parent]
+    if len(roots) != 1:
+        found = ", ".join(map(repr, roots[:5])) or "none: the joints form a cycle"
+        raise DescriptionError(f"links without parent: {found}; expected one, the base", line=line)
+    reached, new = set(roots), list(roots)
+    while new:
+        new = [joint.child for joint in joints if joint.parent in new and joint.child not in reached]
+        reached |= set(new)
+    if lost := sorted(set(links) - reached):
+        raise DescriptionError(f"links {', '.join(lost[:5])} do not hang on {roots[0]!r}; their joints form a cycle", line=line)
+    return roots[0]

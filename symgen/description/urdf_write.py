@@ -12,14 +12,14 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from symgen.description.expression import ONE, Expression
-from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, parameter
-from symgen.description.tree import Array, turn
+from symgen.description.expression import Expression
+from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, one_joint_parameters, parameter
+from symgen.description.tree import Array, transform, turn
 from symgen.errors import DescriptionError
 
 UNLIMITED = 1e9  # where a URDF asks for a limit that the robot does not have
 _TYPES = {REVOLUTE: "revolute", PRISMATIC: "prismatic", FIXED: "fixed"}
-_CARRIED = {"FV": ("viscous", "damping"), "FS": ("coulomb", "friction")}
+_DYNAMICS = {"FV": "damping", "FS": "friction"}
 
 
 def write_urdf(robot: Robot, values: Mapping[str, float] | None = None) -> tuple[str, tuple[str, ...]]:
@@ -27,13 +27,16 @@ def write_urdf(robot: Robot, values: Mapping[str, float] | None = None) -> tuple
 
     Parameters
     ----------
-    robot : without loops; passive joints follow one joint each.
-    values : standard parameters by name, those of the robot file if None. A URDF holds masses, so they must be those of a physical robot:
+    robot : Robot
+        Without loops; passive joints follow one joint each.
+    values : mapping, SI, optional
+        Standard parameters by name; those of the robot file where left out. A URDF holds masses, so they must be those of a physical robot:
         of a feasible estimate, or CAD.
 
     Raises
     ------
-    DescriptionError : loops, relations of several joints, inertial parameters without value, moments without mass.
+    DescriptionError
+        Loops, relations of several joints, inertial parameters without value, moments without mass.
     """
     values = dict(robot.values if values is None else values)
     if robot.loops:
@@ -82,7 +85,7 @@ def _numbers(row: Array) -> str:
 
 
 def _joint(robot: Robot, f: Frame, values: Mapping[str, float]) -> list[str]:
-    T = _placement(robot, f)
+    T = transform([e.value(robot.constants) for e in (f.gamma, f.b, f.alpha, f.d, f.theta0, f.r0)])  # iTj at q_j = 0
     lines = [
         f'  <joint name="q{f.j}" type="{_kind(robot, f)}">',
         f'    <parent link="link{f.ant}"/>',
@@ -92,9 +95,8 @@ def _joint(robot: Robot, f: Frame, values: Mapping[str, float]) -> list[str]:
     if f.sigma == FIXED:
         return [*lines, "  </joint>"]
     lines += ['    <axis xyz="0 0 1"/>', f"    <limit {_attributes(**_limit(robot, f))}/>"]
-    dynamics = {
-        there: values[name] for family, (_, there) in _CARRIED.items() if (name := parameter(family, f.j)) in _plain(robot) & set(values)
-    }
+    own = one_joint_parameters(robot, _DYNAMICS)
+    dynamics = {key: values[name] for family, key in _DYNAMICS.items() if (name := parameter(family, f.j)) in own & set(values)}
     if dynamics:
         lines.append(f"    <dynamics {_attributes(**dynamics)}/>")
     if f.j in robot.constraints:
@@ -115,7 +117,7 @@ def _limit(robot: Robot, f: Frame) -> dict[str, float]:
         bounds = {"lower": ends[0], "upper": ends[1]}
     elif f.sigma == PRISMATIC:
         bounds = {"lower": -UNLIMITED, "upper": UNLIMITED}
-    largest = {there: row.get(here, UNLIMITED) for here, there in (("qd", "velocity"), ("tau", "effort"))}
+    largest = {written: row.get(key, UNLIMITED) for key, written in (("qd", "velocity"), ("tau", "effort"))}
     return bounds | {key: x for key, x in largest.items() if not isinstance(x, tuple)}
 
 
@@ -130,16 +132,6 @@ def _follows(robot: Robot, j: int) -> tuple[int, float, float]:
     return leaders[0], factor.value(robot.constants), rest.value(robot.constants)
 
 
-def _placement(robot: Robot, f: Frame) -> Array:
-    """iTj at q_j = 0, (4, 4)."""
-    T = np.eye(4)
-    for axis, angle, shift in ((2, f.gamma, f.b), (0, f.alpha, f.d), (2, f.theta0, f.r0)):
-        step = np.eye(4)
-        step[:3, :3], step[axis, 3] = turn(axis, angle.value(robot.constants)), shift.value(robot.constants)
-        T = T @ step
-    return T
-
-
 def _roll_pitch_yaw(R: Array) -> Array:
     """R = Rz(yaw) Ry(pitch) Rx(roll); roll is read off what yaw and pitch leave, so that it is exact at pitch = +-pi/2 too."""
     c = math.hypot(R[0, 0], R[1, 0])
@@ -149,20 +141,9 @@ def _roll_pitch_yaw(R: Array) -> Array:
     return np.array([math.atan2(rest[2, 1], rest[1, 1]), pitch, yaw])
 
 
-def _plain(robot: Robot) -> set[str]:
-    """Friction parameters of one joint alone, which <dynamics> holds."""
-    return {
-        parameter(e.family, j)
-        for e in robot.elements
-        if e.family in _CARRIED and e.kind == _CARRIED[e.family][0] and e.when is None
-        for j, row in e.along.items()
-        if row == {j: ONE}
-    }
-
-
 def _losses(robot: Robot, values: Mapping[str, float]) -> tuple[str, ...]:
     inertial = {parameter(p, j) for j in robot.links for p in INERTIAL}
-    lost = [name for name in robot.parameters if name not in inertial | _plain(robot)]
+    lost = [name for name in robot.parameters if name not in inertial | one_joint_parameters(robot, _DYNAMICS)]
     notes = []
     if dropped := [name for name in lost if values.get(name, 0.0)]:
         notes.append(f"values without a place in a URDF, left out: {', '.join(dropped)}")

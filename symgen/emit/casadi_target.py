@@ -13,6 +13,7 @@ from typing import ClassVar
 from symgen.derive.graph import COS, SIGN, SIN, SQRT
 from symgen.description.robot import Robot
 from symgen.emit.header import tables
+from symgen.emit.models import MODELS
 from symgen.emit.printers import Text
 from symgen.emit.python_target import arguments, constants_of, context, listed
 from symgen.emit.render import laid_out
@@ -43,18 +44,15 @@ def render(regrouping: Regrouping, *, command: str | None = None) -> str:
     robot, spec = regrouping.robot, module_spec(regrouping, CasadiText)
     check_labels(robot)
     values = context(spec, command, LANGUAGE, "ca.SX")
-    functions, path_constants = spec.functions, values["path_constants"]
-    takes = {name: arguments(f) for name, f in functions.items()} | {
-        "base_parameters": ["standard", *constants_of(robot, *(c.symbols for b in regrouping.base for c in b.combination.values()))],
-        "forward_dynamics": [
-            "q",
-            "qd",
-            "tau",
-            "X",
-            *constants_of(robot, functions["inertia_matrix"].constants, functions["bias"].constants),
-        ],
-        "passive_joints": ["q", "qd", "qdd", *values["passive_constants"]],  # type: ignore[misc]
-        "jacobian": ["q", *constants_of(robot, functions["frame_poses"].constants, path_constants)],  # type: ignore[arg-type]
+    functions = spec.functions
+    coefficients = [c.symbols for b in regrouping.base for c in b.combination.values()]
+    dynamics = {*arguments(functions["inertia_matrix"]), *arguments(functions["bias"]), "tau"}
+    takes = {
+        **{name: arguments(f) for name, f in functions.items()},
+        "base_parameters": ["standard", *constants_of(robot, *coefficients)],
+        "forward_dynamics": [a for a in (*MODELS["forward_dynamics"].arguments, *robot.constants) if a in dynamics],
+        "passive_joints": ["q", "qd", "qdd", *values["passive_constants"]],
+        "jacobian": ["q", *constants_of(robot, functions["frame_poses"].constants, values["path_constants"])],
     }
     return laid_out(
         "casadi.py",
@@ -64,7 +62,7 @@ def render(regrouping: Regrouping, *, command: str | None = None) -> str:
             "calls": {name: ", ".join(names) for name, names in takes.items()},
             "tables": tables(spec, numpy=False),
             "example": "".join(f", {name}={value!r}" for name, value in list(robot.constants.items())[:1]),
-            "labels": {name: [m.result] for name, m in values["models"].items()} | {"frame_poses": pose_labels(robot)},  # type: ignore[attr-defined]
+            "labels": {name: [m.result] for name, m in MODELS.items()} | {"frame_poses": pose_labels(robot)},
             "blocks": [_block(spec, f) for f in functions.values()],
             "of_frame": listed(takes["jacobian"]),
             "passive_constants": listed(takes["passive_joints"][3:]),

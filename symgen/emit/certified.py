@@ -20,12 +20,13 @@ from types import ModuleType
 import numpy as np
 
 from symgen.derive.columns import element_names
+from symgen.derive.exact import Array
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.emit.generate import generate_files
 from symgen.emit.importing import cached_path, imported, stored_path
 from symgen.errors import SymgenError
-from symgen.regroup.certificate import TOLERANCE, Array, Certificate, certify_formulas, independent
+from symgen.regroup.certificate import TOLERANCE, Certificate, certify_formulas, independent
 from symgen.regroup.regrouping import Regrouping, regroup
 
 STATES = 5  # for the models that are one column of the regressor each

@@ -74,7 +74,7 @@ def imported(path: Path) -> ModuleType:
 class _TextLoader(SourceFileLoader):
     """Loader of the text alone: bytecode of an earlier text that lies beside is neither read nor written."""
 
-    def path_stats(self, path: str | bytes) -> dict[str, float]:  # type: ignore[override]
+    def path_stats(self, path: str | bytes) -> dict[str, float]:
         raise OSError(f"{path!r} has no bytecode")
 
 

@@ -32,7 +32,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "store_constants": list(constant_entries(spec.functions["regressor"], "S")),
             "elements": element_lines(robot, LANGUAGE),
             "evaluated": {name: list(_evaluation(spec, f)) for name, f in spec.functions.items()},
-            "blocks": [_block(spec, f) for f in spec.functions.values()],
+            "blocks": [_block(spec, f) for f in spec.functions.values() if f.sections],
         },
     )
 
@@ -42,6 +42,8 @@ def _evaluation(spec: ModuleSpec, f: Function) -> Iterator[str]:
     shape = ", ".join(map(str, f.model.shape(spec.robot, len(spec.regrouping))))
     yield f"{f.model.result} = np.zeros(({shape}, len(states[0])))"
     yield from constant_entries(f)
+    if not f.sections:
+        return  # nothing acts
     available = (
         (*f.model.states, "G") if f.model.name in ("closure", "curvature") else ("q", "qd", "qdd", "G") if spec.tied else f.model.states
     )
@@ -56,13 +58,13 @@ def constant_entries(f: Function, result: str = "") -> Iterator[str]:
     by_value: dict[float, list[str]] = {}
     for place, value in f.preset:
         by_value.setdefault(value, []).append(f"{result or f.model.result}[{', '.join(map(str, place))}]")
-    for value, places in by_value.items():
+    for value, targets in by_value.items():
         line = ""
-        for place in places:
-            if len(line) + len(place) > WIDTH - 12:
+        for target in targets:
+            if len(line) + len(target) > WIDTH - 12:
                 yield f"{line}{value}"
                 line = ""
-            line += f"{place} = "
+            line += f"{target} = "
         yield f"{line}{value}"
 
 

@@ -158,9 +158,13 @@ def aligned(lines: Sequence[str]) -> tuple[str, ...]:
 
 
 def _unpack(source: str, names: Sequence[str], needed: set[str]) -> list[str]:
-    """`q1, q2 = q`; one by one where not all are needed."""
-    used = [name for name in names if name in needed]
-    return unpacked(used, source) if used == names and len(used) > 1 else [f"{name} = {source}[{names.index(name)}]" for name in used]
+    """`q1, q2 = q`, or a slice of it where those needed stand side by side; else one by one."""
+    used = [(k, name) for k, name in enumerate(names) if name in needed]
+    if len(used) < 2 or used[-1][0] - used[0][0] >= len(used):
+        return [f"{name} = {source}[{k}]" for k, name in used]
+    start, stop = used[0][0] or "", used[-1][0] + 1
+    span = "" if len(used) == len(names) else f"[{start}:{stop if stop < len(names) else ''}]"
+    return unpacked([name for _, name in used], f"{source}{span}")
 
 
 def unpacked(names: Sequence[str], source: str) -> list[str]:

@@ -76,7 +76,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     values["regressor"], coefficients = _signals(regrouping, values["regressor"])
     blocks = {name: _block(regrouping, spec.functions[name].model, entries) for name, entries in values.items()}
     base = context(spec, command, LANGUAGE, "Array", '"')
-    formulas: Sequence[str] = base["formulas"]  # type: ignore[assignment]
+    formulas: Sequence[str] = base["formulas"]
     return laid_out(
         "xp.py",
         {
@@ -124,7 +124,9 @@ def _block(regrouping: Regrouping, model: Model, values: Values) -> Block:
         inputs += [f"{letter}{j} = {state}[..., {k}]" for k, j in enumerate(close(robot).independent) if f"{letter}{j}" in needed]
     inputs += [f"{parameter} = X[{k}]" for k, parameter in enumerate(regrouping.names) if parameter in needed]
     sections = tuple(s for s in (Section("Inputs", tuple(inputs)), *text.sections) if s.lines)
-    read = [a for a in model.arguments if a == "q" or any(f" = {a}[" in line for line in inputs)]
+    lines = [line for section in sections for line in section.lines]
+    needs_package = any("xp." in line for line in (*lines, *results))  # found by q
+    read = [a for a in model.arguments if (a == "q" and needs_package) or any(f" = {a}[" in line for line in inputs)]
     name = "signals" if model.name == "regressor" else model.name
     summary = "The distinct signals of the regressor" if model.name == "regressor" else model.summary
     constants = [c for c in robot.constants if c in needed]

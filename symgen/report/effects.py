@@ -36,7 +36,23 @@ MEANING = {
 
 @dataclass(frozen=True)
 class Effect:
-    """`place` as "link 2" or "joint 2"; `base`: base parameters that take it in; `joints`: rows of STRUCTURE those have; `why` if none."""
+    """What one standard parameter is and does.
+
+    Attributes
+    ----------
+    name, meaning, unit : str
+        The parameter, in words, and its unit.
+    place : str
+        Such as "link 2" or "joint 2".
+    link : int
+        Number of that link or joint.
+    base : tuple of str
+        Base parameters that take it in.
+    joints : tuple of int
+        Joints on whose torques those act.
+    why : str
+        The reason where it has no effect.
+    """
 
     name: str
     meaning: str
@@ -49,7 +65,7 @@ class Effect:
 
 
 def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
-    """Every standard parameter, in the order of eq. (4)."""
+    """The effect of every standard parameter of a module, in the order of eq. (4)."""
     robot = spec.robot
     into: dict[str, list[int]] = {name: [] for name in robot.parameters}
     for k, b in enumerate(spec.regrouping.base):

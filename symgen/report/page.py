@@ -189,31 +189,18 @@ def _pointed_at(spec: ModuleSpec, parameters: Sequence[Effect]) -> Mapping[str, 
     """What the page says of a parameter under the pointer."""
     robot = spec.robot
     by_name = {e.name: e for e in parameters}
-    entries: dict[str, Any] = {
-        e.name: {
-            "text": e.meaning,
-            "unit": printed(e.unit),
-            "place": e.place,
-            "link": e.link,
-            "base": e.base,
-            "joints": e.joints,
-            "why": e.why,
-        }
-        for e in parameters
-    }
+    entries = {e.name: _entry(e, e.meaning, e.base, e.joints, e.why) for e in parameters}
     for k, b in enumerate(spec.regrouping.base):
         own = by_name[b.own]
         absorbed = [name for name in b.combination if name != b.own or b.combination[name] != ONE]
-        entries[b.name] = {
-            "text": own.meaning + (f"; takes in {', '.join(absorbed)}" if absorbed else ""),
-            "unit": printed(own.unit),
-            "place": own.place,
-            "link": own.link,
-            "base": [b.name],
-            "joints": [j for j, entered in zip(robot.joints, spec.structure[k], strict=True) if entered],
-            "why": "",
-        }
+        text = own.meaning + (f"; takes in {', '.join(absorbed)}" if absorbed else "")
+        joints = [j for j, entered in zip(robot.joints, spec.structure[k], strict=True) if entered]
+        entries[b.name] = _entry(own, text, [b.name], joints, "")
     return entries
+
+
+def _entry(e: Effect, text: str, base: Sequence[str], joints: Sequence[int], why: str) -> dict[str, Any]:
+    return {"text": text, "unit": printed(e.unit), "place": e.place, "link": e.link, "base": base, "joints": joints, "why": why}
 
 
 @lru_cache(maxsize=1)

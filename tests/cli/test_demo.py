@@ -8,22 +8,18 @@ import typer
 from campaign import campaign
 from typer.testing import CliRunner
 
+import symgen
 from runtime.motion.reference import point_to_point
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
 from runtime.settings.controller import Points
-from runtime.settings.study import study_from_mapping
-from symgen.cli.session import opened_model
-from symgen.demo import chapter_tables
+from symgen.cli.demo import demo
 from symgen.demo import simulated_record as simulated
-from symgen.demo import tx40 as module
-from symgen.demo.demonstration import demonstrate
-from symgen.demo.sections import differences
+from symgen.demo import tx40, tx40_tables
+from symgen.demo.tx40 import differences
 
 
 def run(*arguments):
     app = typer.Typer()
-    app.command()(module.demo)
+    app.command()(demo)
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
@@ -67,17 +63,17 @@ def test_offline_recovers_what_was_put_in(offline):
     estimate = json.loads((out / "estimate.json").read_text())
     found = dict(zip(estimate["names"], estimate["X"], strict=True))
     for name in ("ZZ1R", "FV1", "MX2R", "FV2", "FS2", "FS3"):
-        assert found[name] == pytest.approx(chapter_tables.TABLE_2[name], rel=0.1)
+        assert found[name] == pytest.approx(tx40_tables.TABLE_2[name], rel=0.1)
 
 
 def test_simulated_trajectory_keeps_the_limits():
-    with opened_model("tx40") as model:
-        path = point_to_point(model, Points(9.0, 1), 5000.0)
-        again = point_to_point(model, Points(9.0, 1), 5000.0)
-        low, high = np.array(model.LIMITS["q"]).T
-        assert (path.q >= low).all() and (path.q <= high).all()
-        assert (np.abs(path.qd) <= np.array(model.LIMITS["qd"])).all()
-        assert (np.abs(path.qdd) <= np.array(model.LIMITS["qdd"])).all()
+    model = symgen.model("tx40")
+    path = point_to_point(model, Points(9.0, 1), 5000.0)
+    again = point_to_point(model, Points(9.0, 1), 5000.0)
+    low, high = np.array(model.LIMITS["q"]).T
+    assert (path.q >= low).all() and (path.q <= high).all()
+    assert (np.abs(path.qd) <= np.array(model.LIMITS["qd"])).all()
+    assert (np.abs(path.qdd) <= np.array(model.LIMITS["qdd"])).all()
     assert np.array_equal(path.q, again.q)
     for x, dx in ((path.q, path.qd), (path.qd, path.qdd)):  # central differences at 5 kHz
         assert np.abs(np.gradient(x, path.t, axis=0) - dx)[1:-1].max() < 5e-3 * np.abs(dx).max()
@@ -86,41 +82,38 @@ def test_simulated_trajectory_keeps_the_limits():
 
 
 @campaign
-def test_measured_record(tx40_data):
+def test_measured_record(tx40_data, tmp_path):
     """Tables 2 and 3 within their tolerances, and every table of the report; one test, since the demo runs once."""
-    with opened_model("tx40") as model:
-        study = study_from_mapping(dataset_study("tx40"))
-        record = read_records(study.record, model)[0]
-        shown = demonstrate(model, study, record, quick=False, step=lambda text: None)
+    shown = tx40.demonstrate(tx40.prepare(quick=False), quick=False)
     check_table_2(shown)
     check_table_3(shown)
     check_coupling(shown)
     check_slow_rows(shown)
-    check_report(shown)
+    check_report(shown, tmp_path)
 
 
 def check_table_2(shown):
-    found = differences(shown)
-    assert shown.found.found.estimate.relative_error < 8
-    assert len(found) == 17
-    assert sum(abs(d) <= 10 for d in found.values()) >= 11
-    assert sum(abs(d) <= 20 for d in found.values()) >= 14
-    assert all(abs(d) <= 40 for d in found.values())
+    off = differences(shown)
+    assert shown.result.essential.estimate.relative_error < 8
+    assert len(off) == 17
+    assert sum(abs(d) <= 10 for d in off.values()) >= 11
+    assert sum(abs(d) <= 20 for d in off.values()) >= 14
+    assert all(abs(d) <= 40 for d in off.values())
 
 
 def check_table_3(shown):
     i = shown.resolution.names.index("ZZ1R")
-    assert [level.mean[i] for level in shown.resolution.levels] == pytest.approx(chapter_tables.TABLE_3["ZZ1R"], abs=0.07)
+    assert [level.mean[i] for level in shown.resolution.levels] == pytest.approx(tx40_tables.TABLE_3["ZZ1R"], abs=0.07)
     assert len(shown.combinations) == 8
-    assert len(shown.torque.levels) == 1 + 2 * len(chapter_tables.PHI)
+    assert len(shown.torque.levels) == 1 + 2 * len(tx40_tables.PHI)
 
 
 def check_coupling(shown):
     """Leaving it out ruins joint 5, which the total hides."""
-    error = {key: [joint.relative_error for joint in fit.per_joint] for key, fit in shown.found.coupling.items()}
+    error = {key: [joint.relative_error for joint in fit.per_joint] for key, fit in shown.result.coupling.items()}
     assert set(error) == {"both", "position", "torque", "none"}
     assert all(error[key][4] > 1.25 * error["both"][4] for key in ("position", "torque", "none"))
-    assert shown.found.coupling["none"].relative_error < shown.found.coupling["both"].relative_error
+    assert shown.result.coupling["none"].relative_error < shown.result.coupling["both"].relative_error
 
 
 def check_slow_rows(shown):
@@ -129,8 +122,8 @@ def check_slow_rows(shown):
     assert slow["FS5"] > base["FS5"] + 0.3 and slow["FV5"] < base["FV5"] - 0.1
 
 
-def check_report(shown):
-    html = module.demo_files(shown, "symgen: 1\n")["report.html"]
+def check_report(shown, folder):
+    html = shown.files(folder)["report.html"]
     for words in (
         "Table 2",
         "Table 3",

@@ -8,9 +8,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from symgen.demo import haptic_record, haptic_tables
+from symgen.cli.demo import demo
+from symgen.demo import haptic_motion, haptic_tables
 from symgen.demo import simulated_record as simulated
-from symgen.demo import tx40 as module
 from symgen.description import load_robot
 
 # chapter, Tables 6 and 7: the fourteen parameters in the order printed, fC as FS
@@ -22,7 +22,7 @@ def quick(tmp_path_factory):
     """The quick demo: a quarter of the record, two runs."""
     out = tmp_path_factory.mktemp("haptic") / "out"
     app = typer.Typer()
-    app.command()(module.demo)
+    app.command()(demo)
     return CliRunner().invoke(app, ["haptic", "-o", str(out), "--quick"]), out
 
 
@@ -82,12 +82,12 @@ def test_table_7_has_the_order_of_the_chapter(quick):
 
 def test_motion():
     """Derivatives by central differences at 1 kHz; constant speed on the triangles; inside the limits of the robot file."""
-    path = haptic_record.motion()
+    path = haptic_motion.motion()
     for x, dx in ((path.q, path.qd), (path.qd, path.qdd)):
         assert np.abs(np.gradient(x, path.t, axis=0) - dx)[1:-1].max() < 1e-4 * np.abs(dx).max()
-    slow = path.t < haptic_record.LOW - haptic_record.CHANGE
+    slow = path.t < haptic_motion.LOW - haptic_motion.CHANGE
     assert ((np.abs(path.qdd[slow]) == 0).mean(axis=0) > 0.85).all()
-    for (_, periods, _), speed in zip(haptic_record.TRIANGLES, np.abs(path.qd[slow]).max(axis=0), strict=True):
+    for (_, periods, _), speed in zip(haptic_motion.TRIANGLES, np.abs(path.qd[slow]).max(axis=0), strict=True):
         assert speed < 0.3 and periods >= 5
     limits = load_robot("haptic").limits
     low, high = np.array(limits["q"]).T
@@ -99,6 +99,6 @@ def test_motion():
 
 def test_unknown_robot_is_bad_input():
     app = typer.Typer()
-    app.command()(module.demo)
+    app.command()(demo)
     result = CliRunner().invoke(app, ["stanford"])
     assert result.exit_code == 2 and "tx40" in result.output and "haptic" in result.output

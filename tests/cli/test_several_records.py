@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 from runtime import load_model
 from runtime.errors import SettingsError
-from runtime.estimators.essential import essential
+from runtime.estimators.essential import essential_of
 from runtime.identification.record_errors import record_errors
-from runtime.observation.by_blocks import reduce_records
+from runtime.observation.observation import observe
 from runtime.records.reading_by_blocks import open_streams
 from runtime.settings.study import study_from_mapping
 from symgen.cli.main import app
@@ -79,16 +79,17 @@ def test_errors_by_blocks_are_those_in_memory(folder):
         np.testing.assert_allclose([one["relative_error"], *one["per_joint"]], [other["relative_error"], *other["per_joint"]], rtol=1e-7)
 
 
-def test_errors_of_records_add_up(folder):
+def test_errors_of_records_add_up(folder, monkeypatch):
     """Squares of the residuals of the records are that of all."""
     model = load_model(folder / "planar_2r.py")
     record = {"files": ["a.csv"], "also": ["b.csv", "c.csv"], "units": {"q": "deg"}}
     study = study_from_mapping({"record": record, "stream": 1000})
     streams = open_streams(study.record, model, folder=folder)
-    reduction = reduce_records(model, streams, study)
-    fit = essential(reduction, study.essential, study.estimate, model=model).all_parameters
+    monkeypatch.setattr("runtime.observation.observation.HELD", 0)
+    reduction = observe(model, streams, study)
+    fit = essential_of(reduction, study.essential, study.estimate, model=model).all_parameters
     parts = record_errors(reduction, fit, [stream.name for stream in streams])
-    sizes = [np.linalg.norm(np.concatenate([j.R[:, -1] for s in reduction.segments if s.record == k for j in s.joints])) for k in range(3)]
+    sizes = [np.linalg.norm(np.concatenate([j.R[:, -1] for s in reduction.reduced.segments if s.record == k for j in s.joints])) for k in range(3)]
     total = np.sqrt(sum((part.relative_error / 100 * size) ** 2 for part, size in zip(parts, sizes, strict=True)))
     assert total == pytest.approx(fit.residual_norm, rel=1e-10)
 

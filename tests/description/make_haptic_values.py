@@ -1,6 +1,6 @@
 """The `values` of the packaged haptic interface: a consistent branch whose base parameters are those of Table 6 of the chapter.
 
-Run `python tests/description/make_haptic_values.py` and paste its output into `symgen/description/robots/haptic.yaml`.
+Run `python tests/description/make_haptic_values.py` (pip install cvxpy) and paste its output into `symgen/description/robots/haptic.yaml`.
 
 Table 6 fixes fourteen base parameters; infinitely many branches have them. This one is nearest to a prior of six homogeneous boxes, in the
 coordinate-free distance of their pseudo-inertias P_j (4x4, about the link frame origin):

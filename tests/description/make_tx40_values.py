@@ -1,6 +1,6 @@
 """The `values` of the packaged tx40: a consistent arm whose base parameters are those of Table 2 of the chapter.
 
-Run `python tests/description/make_tx40_values.py` and paste its output into `symgen/description/robots/tx40.yaml`.
+Run `python tests/description/make_tx40_values.py` (pip install cvxpy) and paste its output into `symgen/description/robots/tx40.yaml`.
 
 Table 2 fixes 21 base parameters; infinitely many arms have them. This one is nearest to a prior of six homogeneous boxes, in the
 coordinate-free distance of their pseudo-inertias P_j (4x4, about the link frame origin):

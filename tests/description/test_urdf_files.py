@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from oracles.urdf_robots import panda, ur5
 from symgen.description import Robot, load_robot, parse
 from symgen.description.urdf import read_urdf
-from symgen.description.urdf_text import MAX_BYTES
 from symgen.description.urdf_write import write_urdf
+from symgen.description.xml_text import MAX_BYTES
 from symgen.errors import DescriptionError
 
 ARM = """\

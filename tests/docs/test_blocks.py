@@ -24,8 +24,8 @@ from campaign import campaign
 from ruamel.yaml import YAML
 from typer.main import get_command
 
+from runtime.identification.fleet import FleetSettings
 from runtime.settings.files import settings_from_text, study_from_text
-from symgen.cli.fleet_jobs import FleetSettings
 from symgen.cli.main import app
 from symgen.description.schema import RobotFile
 

@@ -7,18 +7,21 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import symgen
 from oracles.random_robots import random_robot
 from runtime import load_model
+from symgen.cli.main import app
 from symgen.derive.lagrange import Lagrange
 from symgen.description import load_robot, packaged_robots
 from symgen.emit import importing
-from symgen.emit.certified import CertificateError, certified_files, certify, model
+from symgen.emit.certified import CertificateError, certified_files, certify, model, require_valid
 from symgen.emit.generate import generate_files, generate_module
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import regroup
@@ -180,3 +183,28 @@ def test_two_processes_at_once_and_others_that_load_the_file(cache) -> None:
     file, name = files.pop().split()
     assert load_model(Path(file)).NAME == name == "planar_2r"
     assert [path for path in cache.rglob("*") if path.is_file()] == [Path(file)]  # nothing half written is left
+
+
+@pytest.mark.parametrize("change", [{"numeric_rank": 3}, {"torque_error": 1e-6}, {"torque_error": float("nan")}, {"failures": ("column of M1",)},
+                                    {"module_errors": {"bias": float("nan")}}])  # fmt: skip
+def test_every_check_counts_for_the_verdict(change) -> None:
+    """`certify().valid` was true where `symgen check` printed FALSE: the numeric checks were those of the command line alone."""
+    certificate = certify(regroup(load_robot("planar_2r")))
+    worse = replace(certificate, **change)
+    assert certificate.valid and certificate.mapping()["valid"] and str(certificate).endswith("certificate valid")
+    assert not worse.valid and not worse.mapping()["valid"] and str(worse).endswith("certificate FALSE")
+    with pytest.raises(CertificateError):
+        require_valid(worse)
+
+
+@pytest.mark.parametrize(("name", "valid"), [("planar_2r", True), ("scara", False)])
+def test_the_verdict_is_that_of_symgen_check(name, valid, monkeypatch) -> None:
+    from symgen.regroup import regrouping as module
+
+    base = regroup(load_robot(name))
+    base = base if valid else replace(base, base=base.base[:-1])
+    monkeypatch.setattr(module, "regroup", lambda robot: base)
+    result = CliRunner().invoke(app, ["check", name, "--json"])
+    assert json.loads(result.stdout)["valid"] is certify(base).valid is valid and result.exit_code == (0 if valid else 1)
+    shown = CliRunner().invoke(app, ["show", name])
+    assert shown.exit_code == (0 if valid else 1) and ("certificate FALSE" in shown.stderr) is not valid

@@ -135,7 +135,7 @@ def test_titles_stay_text(title: str) -> None:
     assert code(generate_module(without_hash(hostile))) == code(generate_module(without_hash(plain)))
 
 
-@pytest.mark.parametrize("constant", ["C2", "W12", "VP13", "S2"])
+@pytest.mark.parametrize("constant", ["C2", "W12", "VP13", "S2", "states", "GAM", "T"])
 def test_a_constant_named_as_a_quantity_is_refused(constant: str) -> None:
     with pytest.raises(SymgenError, match=constant):
         generate_module(arm(constant=constant))
@@ -168,3 +168,100 @@ def test_more_than_nine_joints_have_separated_indices() -> None:
     tau = model.torque(q, qd, qdd, chi)
     found = module.regressor(q, qd, qdd) @ module.base_parameters(chi)
     assert np.abs(found - tau).max() <= 1e-10 * np.abs(tau).max()
+
+
+GEARED = """
+symgen: 1
+name: geared
+title: three joints in a plane, the third driven from the frame through a belt of ratio KR
+gravity: [0, -g, 0]
+constants: {L: 0.4, KR: 0.5, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 1, mu: 0, alpha: pi/2, d: L, theta: 0, r: q2}
+  3: {ant: 2, sigma: 1, alpha: pi/2, d: 0, theta: 0, r: q3}
+constraints: {q2: KR*q3}
+elements:
+  FV: {kind: viscous, along: {1: q1 + KR*q3, 3: q3}}
+  K: {kind: stiffness, form: {3: KR*q3**2 + q1*q3}}
+"""
+
+
+def test_jacobian_and_elements_are_those_of_the_constants_given() -> None:
+    """The rate of a passive joint and the row of an element hold a constant: another value of it acts as in the robot file."""
+    module = loaded(parse_robot(GEARED.encode(), "geared.yaml"))
+    doubled = loaded(parse_robot(GEARED.replace("KR: 0.5", "KR: 2.0").encode(), "geared.yaml"))
+    q = states(2, 5)[0]
+    assert np.array_equal(module.jacobian(q, KR=2.0), doubled.jacobian(q)) and not np.array_equal(module.jacobian(q), doubled.jacobian(q))
+    assert module.elements(KR=2.0) == doubled.ELEMENTS != module.ELEMENTS
+    step, h = np.array([0.3, -0.7]), 1e-6
+    ahead, behind = (module.frame_poses(q + sign * h * step, KR=2.0)[:, -1, :3, 3] for sign in (1, -1))
+    assert np.allclose((ahead - behind) / (2 * h), module.jacobian(q, KR=2.0)[:, :3] @ step, atol=1e-8)
+
+
+def test_constants_of_paths_may_be_called_as_locals() -> None:
+    """P, J, v are names of lengths and ratios as well."""
+    q = states(2, 5)[0]
+    expected = loaded(parse_robot(GEARED.encode(), "geared.yaml")).jacobian(q)
+    for name in ("P", "J", "v", "k", "rate", "path"):
+        renamed = GEARED.replace("KR", name)
+        assert np.array_equal(loaded(parse_robot(renamed.encode(), "geared.yaml")).jacobian(q), expected), name
+
+
+ONE = """
+symgen: 1
+name: one
+gravity: [0, -g, 0]
+constants: {g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+"""
+
+
+def test_one_joint_takes_the_shapes_it_means() -> None:
+    """(N, 1) or (1,); (N,) is no record of one joint: the error says what is expected."""
+    module = loaded(parse_robot(ONE.encode(), "one.yaml"))
+    X = np.ones(len(module.BASE_PARAMETERS))
+    q = states(1, 5)
+    assert module.inverse_dynamics(*q, X).shape == (5, 1) and module.inverse_dynamics(*q[:, 0], X).shape == (1,)
+    assert module.regressor(*q[:, :0]).shape == (0, 1, len(X))
+    for call in (module.regressor, module.observation_matrix):
+        with pytest.raises(ValueError, match=r"\(5,\).*expected \(N, 1\)"):
+            call(*q[:, :, 0])
+    for call in (module.gravity, module.inertia_matrix):
+        with pytest.raises(ValueError, match=r"\(5,\).*expected \(N, 1\)"):
+            call(q[0, :, 0], X)
+    with pytest.raises(ValueError, match=r"\(5,\).*expected \(N, 1\)"):
+        module.frame_poses(q[0, :, 0])
+
+
+def test_states_have_one_shape(tx40: ModuleType) -> None:
+    q, qd, qdd = states(6, 5)
+    for wrong in ((q, qd[:3], qdd), (q, qd, qdd[0]), (q[:, :5], qd[:, :5], qdd[:, :5]), (q[None], qd[None], qdd[None])):
+        with pytest.raises(ValueError, match=r"expected \(N, 6\) each"):
+            tx40.regressor(*wrong)
+
+
+CROSSED = """
+symgen: 1
+name: crossed
+gravity: [0, -g, 0]
+constants: {L: 0.4, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: 0, d: L, theta: q2, r: 0}
+elements:
+  FS: {kind: coulomb, along: {1: q1 + q2, 2: q1 - q2}}
+  FV: {kind: viscous, along: {1: q1 - q2, 2: q1 + 2*q2}}
+"""
+
+
+def test_rates_of_the_same_joints_have_names_of_their_own() -> None:
+    """Friction along q1 + q2 and along q1 - q2 in one file: a name each, and the values of CasADi energies."""
+    robot = parse_robot(CROSSED.encode(), "crossed.yaml")
+    text = generate_module(robot)
+    assert "W32 = QP1 + QP2" in text and "QPFS2 = QP1 - QP2" in text and "QPFV2 = QP1 + 2*QP2" in text
+    module, model = loaded(robot), Lagrange(robot)
+    q, qd, qdd = states(2, 20)
+    chi = np.random.default_rng(5).standard_normal(len(robot.parameters))
+    assert np.allclose(module.regressor(q, qd, qdd) @ module.base_parameters(chi), model.torque(q, qd, qdd, chi), rtol=1e-11, atol=1e-11)

@@ -27,9 +27,9 @@ def test_header_counts_are_those_of_the_text(name: str) -> None:
     header = ast.get_docstring(tree) or ""
     blocks = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name.endswith("_block")}
     stated = re.findall(r"^ {4}(\w+) +(\d+) multiplications, (\d+) additions", header, re.MULTILINE)
-    assert len(stated) == len(blocks) >= 6
-    for function, mul, add in stated:
-        body = "\n".join(ast.unparse(statement) for statement in blocks[f"_{function}_block"].body)
+    assert len(stated) >= 6 and {f"_{function}_block" for function, *_ in stated} >= blocks.keys()
+    for function, mul, add in stated:  # a model in which nothing acts has no block
+        body = "\n".join(ast.unparse(statement) for statement in getattr(blocks.get(f"_{function}_block"), "body", []))
         assert counted(body) == (int(mul), int(add)), function
 
 

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import monotonic, process_time
+from time import monotonic
 
 SECONDS = 5.0  # of processor time
 START = 10.0  # s of processor time that a new process takes to import what it needs, at most
@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True)
 class Outcome:
-    """kind : ok, refused or a fault's name.   where : what tells faults apart.   seconds : processor time.   peak : bytes, the most so far."""
+    """kind : ok, refused or a fault's name.   where : what tells faults apart.   seconds : processor time.   peak : bytes, the most so far, with the largest process started."""
 
     kind: str
     where: str = ""
@@ -49,7 +49,7 @@ def judged(read: Callable[[Path], object], path: Path, named: tuple[str, ...] = 
     from runtime.errors import InputError
     from symgen.errors import SymgenError
 
-    start = process_time()
+    start = processor_time()
     try:
         read(path)
     except (InputError, SymgenError) as e:
@@ -60,10 +60,16 @@ def judged(read: Callable[[Path], object], path: Path, named: tuple[str, ...] = 
             problem = "holds characters that a terminal obeys"
         elif len(text) > LONGEST:
             problem = f"has more than {LONGEST} characters"
-        return Outcome("unclear" if problem else "refused", f"{problem} {place(e)}".strip(), text[:600], process_time() - start)
+        return Outcome("unclear" if problem else "refused", f"{problem} {place(e)}".strip(), text[:600], processor_time() - start)
     except BaseException as e:
-        return Outcome(type(e).__name__, place(e), "".join(traceback.format_exception(e))[-3000:], process_time() - start)
-    return Outcome("ok", seconds=process_time() - start)
+        return Outcome(type(e).__name__, place(e), "".join(traceback.format_exception(e))[-3000:], processor_time() - start)
+    return Outcome("ok", seconds=processor_time() - start)
+
+
+def processor_time() -> float:
+    """Seconds of this process and of those that it has started and ended."""
+    used = os.times()
+    return used.user + used.system + used.children_user + used.children_system
 
 
 def place(e: BaseException) -> str:
@@ -102,7 +108,7 @@ def serve(pipe, folder: Path) -> None:
             limited = True
         path = written(folder, known[name].ending, content)
         outcome = judged(known[name].read, path, known[name].named)
-        pipe.send(replace(outcome, peak=memory("VmHWM")))
+        pipe.send(replace(outcome, peak=memory("VmHWM") + 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss))
 
 
 def memory(key: str) -> int:

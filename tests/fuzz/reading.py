@@ -41,16 +41,16 @@ def read_and_derive(path: Path) -> object:
 
 def read_study(path: Path) -> object:
     from runtime.settings.files import load_study
+    from runtime.settings.location import located, study_text
     from runtime.settings.study import to_mapping
-    from symgen.cli.session import study_text
 
     study = load_study(path)
     to_mapping(study)
-    return study_text(study, path.parent, path.parent)
+    return study_text(located(study, path.parent), path.parent)
 
 
 def read_fleet(path: Path) -> object:
-    from symgen.cli.fleet_jobs import jobs_of
+    from runtime.identification.fleet import jobs_of
 
     return jobs_of(path)
 
@@ -75,7 +75,7 @@ def two_joints() -> object:
 def read_record(path: Path) -> object:
     """Whole and, where the format has it, by blocks: both give the same samples or both refuse."""
     from runtime.errors import InputError
-    from runtime.records.formats.table import BLOCK_READERS
+    from runtime.records.formats.table import format_of
     from runtime.records.reading import read_record as read
     from runtime.records.reading_by_blocks import open_stream
     from runtime.settings.study import RecordSettings
@@ -87,12 +87,12 @@ def read_record(path: Path) -> object:
         whole = read(settings, folder=path.parent)
     except InputError as e:
         refused = e
-    if path.suffix in BLOCK_READERS:
+    if format_of(path).by_blocks and path.suffix != ".gz":
         try:
             stream = open_stream(settings, folder=path.parent, block=10)
             blocks = [q for _, q, _ in stream.blocks()]
         except InputError:
-            if refused is None and path.suffix in (".csv", ".npy"):
+            if refused is None:
                 raise
         else:
             if refused is None and not np.array_equal(np.concatenate(blocks), whole.q):  # type: ignore[attr-defined]

@@ -225,7 +225,7 @@ def checkpoint_arrays() -> dict[str, np.ndarray]:
 def estimate_file() -> bytes:
     from hashlib import sha256
 
-    from runtime.estimators import estimate
+    from runtime.estimators.methods import estimate_of
     from runtime.model.generated import ModelText  # a model from text, checked like any file
     from runtime.observation.observation import observe, stack
     from runtime.records.record import Record
@@ -236,6 +236,6 @@ def estimate_file() -> bytes:
     text = generate_module(load_robot("planar_2r"))
     model = ModelText("planar_2r.py", text, sha256(text.encode()).hexdigest()).load()
     rng, t = np.random.default_rng(1), np.arange(400) / 100
-    record = Record(t, np.sin(t[:, None] * [1.0, 2.3]), rng.standard_normal((400, 2)), 100.0, "x")
+    record = Record(t, np.sin(t[:, None] * [1.0, 2.3]), rng.standard_normal((400, 2)), rate=100.0, name="x")
     study = study_from_mapping({"signals": {"lowpass": None, "decimate": None}})
-    return estimate(stack([observe(model, record, study)]), study.estimate, model=model).to_json().encode()
+    return estimate_of(stack([observe(model, record, study)]), study.estimate, model=model).to_json().encode()

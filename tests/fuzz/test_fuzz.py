@@ -14,13 +14,6 @@ CASES = 200  # of all formats in the default run
 MORE = 40000 if FULL else 3000  # of a campaign: a third of the fixed seed, the others of one that was never tried
 
 
-@pytest.fixture(scope="module")
-def reader():
-    reader = Reader()
-    yield reader
-    reader.close()
-
-
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*/*")), ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_corpus(reader, path):
     outcome = reader(path.parent.name, path.read_bytes())
@@ -52,6 +45,7 @@ def test_a_case_is_told_by_its_number():
             assert case(name, 7, 3) == case(name, 7, 3) != case(name, 7, 4)
 
 
+@campaign
 def test_the_harness_finds_faults():
     """A hang, an interpreter that ends, memory, a traceback and an unclear message are each seen."""
     reader = Reader(seconds=1.0)

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from fuzz.archives import npy_header, plain_npy
-from fuzz.harness import Reader
 from fuzz.seeds import csv_file, model_files, npz_members, robot_file, urdf_files
 from runtime.errors import InputError
 from runtime.files import read_bytes
@@ -25,13 +24,6 @@ from symgen.errors import DescriptionError
 
 PLANAR = robot_file("planar_2r").decode()
 STUDY = "record: {files: [a.csv]}\n"
-
-
-@pytest.fixture(scope="module")
-def reader():
-    reader = Reader()
-    yield reader
-    reader.close()
 
 
 def refused(reader, name, content, said=""):

@@ -58,4 +58,4 @@ def record(N=6000, rate=1000.0, noise=0.05, seed=0, X=TRUE):
     t = np.arange(N) / rate
     q, qd, qdd = motion(t)
     tau = planar.inverse_dynamics(q, qd, qdd, X) + noise * np.random.default_rng(seed).standard_normal((N, 2))
-    return Record(t, q, tau, rate, name="planar", files={"planar.csv": "cd" * 32})
+    return Record(t, q, tau, rate=rate, name="planar", files={"planar.csv": "cd" * 32})

@@ -9,7 +9,7 @@ from bag_files import KINDS, joint_states, write_bag
 
 from runtime import read_record
 from runtime.errors import InputError
-from runtime.records.formats.bags import read_bag
+from runtime.records.formats.table import open_table
 from runtime.records.reading_by_blocks import are_large, open_stream
 from runtime.settings.study import study_from_mapping
 
@@ -137,7 +137,7 @@ def test_without_its_library(tmp_path, monkeypatch):
     path = bag(tmp_path)
     monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(InputError, match=r"pip install symgen\[bags\]"):
-        read_bag(path)
+        open_table(path)
 
 
 def test_paths(tmp_path):

@@ -11,7 +11,7 @@ from planar_data import TRUE, motion, record
 from scipy.stats import t
 
 from runtime.errors import InputError, ModelError, SettingsError
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.model.drives import Drives
 from runtime.model.generated import ModelText
 from runtime.observation.filters import filtered_states
@@ -59,7 +59,7 @@ def test_statistics_are_equations_18_to_22(small):
     seen = observation_from_states(planar, clean, decimated_torque(RECORD.tau, selection), selection)
     rho_ls, rho = (np.linalg.norm(seen.Y - seen.W @ x) for x in (X_ls, mean))
     own = np.mean([run.residual_norm for run in result.runs])
-    assert np.allclose(X_ls, estimate(seen).X, rtol=1e-9)
+    assert np.allclose(X_ls, estimate_of(seen).X, rtol=1e-9)
     assert np.allclose(result.mean, mean) and np.allclose(result.sigma, sigma)
     assert np.allclose(result.relative_sigma, 100 * sigma / np.abs(mean))
     assert np.allclose(result.e, 100 * np.abs(1 - mean / X_ls))
@@ -110,7 +110,7 @@ def test_weights_take_the_way_of_the_identification():
     q = perturbed_position(RECORD.q, Level(1e-3), weighted.cestac, None, (0, 1))
     seen = observe(planar, replace(RECORD, q=q), weighted)
     assert found.levels[0].runs[1].method == "triangular factor"
-    assert np.allclose(found.levels[0].runs[1].X, estimate(seen, weighted.estimate).X, rtol=1e-9)
+    assert np.allclose(found.levels[0].runs[1].X, estimate_of(seen, weighted.estimate).X, rtol=1e-9)
 
 
 def test_tasks_have_fixed_borders():
@@ -255,7 +255,7 @@ class Measured:
 def estimate_like(relative_sigma):
     """An Estimate of parameters a, b, c with the given %sigma."""
     instants = np.arange(4.0)
-    full = estimate(Observation(np.eye(4, 3), np.ones(4), (4,), ("a", "b", "c"), instants, np.zeros(4, dtype=int), 1.0))
+    full = estimate_of(Observation(np.eye(4, 3), np.ones(4), (4,), ("a", "b", "c"), instants, np.zeros(4, dtype=int), 1.0))
     X = np.array([1.0, 2.0, 3.0])
     return replace(full, X=X, sigma=np.array(relative_sigma) * X / 100, residual_norm=2.0)
 
@@ -274,8 +274,8 @@ def test_text_and_json(small):
     assert data["provenance"]["seed"] == 1 and data["provenance"]["files"] == {"planar.csv": "cd" * 32}
     assert len(data["levels"]) == 2 and data["levels"][0]["level"] == {"delta": 0.001, "torque": 0.0}
     text = str(small)
-    assert "%e(rho), printed" in text and "verdict" in text
-    assert len(small.errors_table().splitlines()) == 11
+    assert "%e(rho) (22), measured W, as printed" in text and "verdict" in text
+    assert len(small.error_table().to_text().splitlines()) == 11
     assert Level(2 * np.pi / 5000).label == "2*pi/5000" and Level(0.0).label == "none"
     assert Level(1e-6).label == "1e-06"  # a linear encoder, m: no counts per turn
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.estimators import estimate
-from runtime.estimators.essential import essential
+from runtime.estimators.methods import estimate_of
+from runtime.estimators.essential import essential_of
 from runtime.identification.validation import split_validation
 from runtime.model.generated import load_model
 from runtime.observation.observation import observe
@@ -49,7 +49,7 @@ def observation(model, record, study):
 
 @pytest.fixture(scope="module")
 def found(observation, study, model):
-    return essential(observation, study.essential, study.estimate, model=model)
+    return essential_of(observation, study.essential, study.estimate, model=model)
 
 
 def test_all_parameters_are_determined(found, observation):
@@ -78,7 +78,7 @@ def test_essential_parameters(found):
 
 
 def test_weights_sharpen_the_wrist(observation, study, model, found):
-    weighted = essential(observation, study.essential, EstimateSettings(method="wls"), model=model).all_parameters
+    weighted = essential_of(observation, study.essential, EstimateSettings(method="wls"), model=model).all_parameters
     for name in ("Ia4", "FV4", "FS4", "Ia6", "FV6"):
         i = weighted.names.index(name)
         assert weighted.relative_sigma[i] < 0.65 * found.all_parameters.relative_sigma[i]
@@ -93,7 +93,7 @@ def test_essential_parameters_predict_better(observation, study, found):
 
 def test_halves_of_the_record_differ_by_the_corrected_deviation(observation, found):
     """(X_1 - X_2) / sigma of the difference: rms 3.0 with eq. (10), 1.3 with residuals taken as correlated; 1 would be exact."""
-    first, second = (estimate(observation.between(*window).columns(found.names)) for window in ((0, 3.7), (3.7, 7.5)))
+    first, second = (estimate_of(observation.between(*window).columns(found.names)) for window in ((0, 3.7), (3.7, 7.5)))
 
     def rms(name):
         return np.sqrt(np.mean(((first.X - second.X) / np.hypot(getattr(first, name), getattr(second, name))) ** 2))

@@ -11,7 +11,7 @@ import pytest
 
 from runtime import InputError, load_model
 from runtime.errors import SettingsError
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.estimators import fixed_point as iteration
 from runtime.estimators.closed_loop import closed_loop, slips, slowest
 from runtime.motion.reference import Reference, reference_of
@@ -98,7 +98,7 @@ def test_noise_free_record_gives_the_truth(arm, clean, method):
     """
     model, _, _, truth, _ = arm
     options = {"start": away(truth, model.BASE_PARAMETERS), "passes": 30} if method in SIMULATING else {}
-    found = estimate(clean[1], EstimateSettings(method, options={"position_error": 0.0} if method == "tls" else options), model=model)
+    found = estimate_of(clean[1], EstimateSettings(method, options={"position_error": 0.0} if method == "tls" else options), model=model)
     assert found.status == "ok", found.message
     unexplained = clean[1].W @ (found.X - truth)
     assert np.linalg.norm(unexplained) < (2e-6 if method == "didim" else 1e-3) * np.linalg.norm(clean[1].Y)
@@ -112,7 +112,7 @@ def test_output_error_of_a_noise_free_record_is_nothing(emps, axes, output):
     truth, followed = np.array([95.0, 205.0, 20.0, -3.0]), Reference.sampled(records[0].q_r[:6000], 1000.0)
     record = axes[0].run(truth, followed, ideal=True).record()
     seen = closed_loop(model, [record], replace(study, rows=replace(study.rows, low_speed=0.01)), axes[0], around=0.02).measured()
-    found = estimate(seen, EstimateSettings("cloe", options={"output": output, "start": "values"}), model=model)
+    found = estimate_of(seen, EstimateSettings("cloe", options={"output": output, "start": "values"}), model=model)
     assert found.status == "ok" and found.details["output"] == output
     np.testing.assert_allclose(found.X, truth, rtol=1e-6)
     assert found.details["output_error"][0] < 1e-6
@@ -138,7 +138,7 @@ def test_emps_record(emps, axes, method, masked, expected):
     model, study, records = emps
     study = replace(study, rows=replace(study.rows, low_speed=0.01 if masked else 0.0))
     seen = closed_loop(model, records[:1], study, axes[0], around=0.02 if masked else 0.0).measured()
-    found = estimate(seen, EstimateSettings(method), model=model)
+    found = estimate_of(seen, EstimateSettings(method), model=model)
     assert found.status == "ok"
     np.testing.assert_allclose(found.X, expected, rtol=1.5e-2 if masked else 1e-3 if method == "cloe" else 2e-4)
     if not masked:
@@ -150,7 +150,7 @@ def test_emps_delay_moves_didim_and_spares_instruments(emps, axes):
     """With the delay of the diagram, all rows: DIDIM M 93.61 and 5.77 %, instruments as before. The delay is a setting to compare."""
     model, study, records = emps
     seen = closed_loop(model, records[:1], study, axes[1]).measured()
-    didim, iv = (estimate(seen, EstimateSettings(method), model=model) for method in ("didim", "iv"))
+    didim, iv = (estimate_of(seen, EstimateSettings(method), model=model) for method in ("didim", "iv"))
     assert didim["M1R"] == pytest.approx(93.61, rel=1.5e-3) and didim.relative_error == pytest.approx(5.77, rel=5e-3)
     assert iv["M1R"] == pytest.approx(95.141, rel=1e-4) and iv["FV1"] == pytest.approx(203.56, rel=2e-3)
 
@@ -160,14 +160,14 @@ def test_unit_start_needs_gains_that_follow(emps, axes):
     model, study, records = emps
     seen = closed_loop(model, records[:1], study, axes[0]).measured()
     for method, M in (("iv", 95.141), ("didim", 94.890)):
-        found = estimate(seen, EstimateSettings(method, options={"start": "unit"}), model=model)
+        found = estimate_of(seen, EstimateSettings(method, options={"start": "unit"}), model=model)
         assert found.status == "ok" and found["M1R"] == pytest.approx(M, rel=1e-4)
         gains = [entry["g"][0] for entry in found.details["trail"]]
         assert gains[0] == pytest.approx(1 / 95.1, rel=0.01) and gains[-1] == 1.0
     with pytest.raises(InputError, match=r"unstable.*start: values \(robot file\), unit, or parameters by name"):
-        estimate(seen, EstimateSettings("didim", options={"start": "unit", "gains": "one"}), model=model)
+        estimate_of(seen, EstimateSettings("didim", options={"start": "unit", "gains": "one"}), model=model)
     with pytest.raises(InputError, match="gains: start: these parameters have no positive inertia about joint 1"):
-        estimate(seen, EstimateSettings("iv", options={"start": {"M1R": -1.0}, "gains": "start"}), model=model)
+        estimate_of(seen, EstimateSettings("iv", options={"start": {"M1R": -1.0}, "gains": "start"}), model=model)
 
 
 def test_instruments_of_another_motion_are_weak(emps, axes):
@@ -177,7 +177,7 @@ def test_instruments_of_another_motion_are_weak(emps, axes):
     other_motion = 0.05 * (1 - np.cos(2 * np.pi * 0.7 * record.t[:, None])) + record.q_r[0]
     other = replace(loop, parts=(replace(loop.parts[0], reference=Reference.sampled(other_motion, 1000.0)),))
     seen = other.measured()
-    found = estimate(seen, EstimateSettings("iv"), model=model)
+    found = estimate_of(seen, EstimateSettings("iv"), model=model)
     assert found.status in ("weak-instruments", "not-converged") and "instruments do not explain W" in found.message
     assert found.details["correlation"] < 0.1 or found.details["cond"] > 1e4
 
@@ -197,7 +197,7 @@ def test_rows_of_stacked_records(emps, axes):
 
 
 def test_window_keeps_the_loop(arm, clean):
-    half = estimate(clean[1].between(0.0, 2.0), EstimateSettings("didim", options={"passes": 30}), model=arm[0])
+    half = estimate_of(clean[1].between(0.0, 2.0), EstimateSettings("didim", options={"passes": 30}), model=arm[0])
     np.testing.assert_allclose(half.X, arm[3], rtol=0, atol=1e-3)
 
 
@@ -221,10 +221,10 @@ def test_what_is_missing_is_said(arm, clean, method):
     model, study = arm[:2]
     plain = observe(model, clean[0], study)
     with pytest.raises(SettingsError, match="give a section `controller`"):
-        estimate(plain, EstimateSettings(method), model=model)
+        estimate_of(plain, EstimateSettings(method), model=model)
     for options, said in (({"passes": 0}, "passes: 0; expected at least 1"), ({"start": "cad"}, "cad"), ({"speed": 1}, "speed")):
         with pytest.raises(SettingsError, match=said):
-            estimate(clean[1], EstimateSettings(method, options=options), model=model)
+            estimate_of(clean[1], EstimateSettings(method, options=options), model=model)
 
 
 def test_unknown_reference(arm, clean):
@@ -243,7 +243,7 @@ def test_unknown_reference(arm, clean):
     with pytest.raises(InputError, match="the reference ends after"):
         longer = replace(record, t=np.arange(6000) / 1000, q=np.zeros((6000, 2)), tau=np.zeros((6000, 2)))
         closed_loop(model, [longer], study, simulator)
-    found = estimate(
+    found = estimate_of(
         closed_loop(model, [record], study, blind, reference="measured", around=0.05).measured(), EstimateSettings("iv"), model=model
     )
     assert "The reference of this record is not known" in found.message
@@ -253,7 +253,7 @@ def test_unknown_reference(arm, clean):
 def test_parameters_without_inertia_are_refused_on_the_way(arm, clean):
     model = arm[0]
     with pytest.raises(InputError, match="cannot be simulated with the parameters it starts from"):
-        estimate(clean[1], EstimateSettings("didim", options={"start": {"FV1": 1.0}, "gains": "one"}), model=model)
+        estimate_of(clean[1], EstimateSettings("didim", options={"start": {"FV1": 1.0}, "gains": "one"}), model=model)
     with pytest.raises(SettingsError, match="no parameter M9"):
         iteration.initial(clean[1].closed_loop.loop, clean[1], {"M9": 1.0})
 

@@ -12,7 +12,7 @@ import typer
 from planar_data import record
 from typer.testing import CliRunner
 
-from runtime.distributed import results
+from runtime.parallel import results
 from runtime.errors import InputError
 from runtime.resolution.cestac import cestac
 from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
@@ -59,6 +59,7 @@ def failing(context, key):
     return key
 
 
+@pytest.mark.campaign
 def test_same_bits_as_one_process(cluster):
     here = cestac(planar, RECORD, STUDY)
     calls = []
@@ -82,16 +83,18 @@ def test_a_worker_killed_halfway_changes_nothing(cluster):
 
 @pytest.mark.campaign
 def test_a_dead_worker_loses_nothing(cluster, tmp_path):
-    found = sorted(results(dying_once, tmp_path, range(20), cluster.scheduler_address))
+    found = sorted(results(dying_once, tmp_path, range(20), scheduler=cluster.scheduler_address))
     assert found == [(key, tmp_path) for key in range(20)]
     assert (tmp_path / "died").exists()
 
 
+@pytest.mark.campaign
 def test_a_failing_task_is_the_callers_error(cluster):
     with pytest.raises(ValueError, match="key 2"):
-        list(results(failing, 2, range(5), cluster.scheduler_address))
+        list(results(failing, 2, range(5), scheduler=cluster.scheduler_address))
 
 
+@pytest.mark.campaign
 def test_fleet(cluster, emps_data, tmp_path):
     (tmp_path / "fleet.yaml").write_text("jobs: [{robot: emps, record: emps}, {robot: emps, record: missing.csv}]")
     app = typer.Typer()
@@ -110,10 +113,10 @@ def test_no_scheduler():
         listening.listen()
         port = listening.getsockname()[1]
         with pytest.raises(InputError, match=f"no answer from the scheduler tcp://127.0.0.1:{port}"):
-            list(results(failing, None, range(2), f"tcp://127.0.0.1:{port}", timeout=0.5))
+            list(results(failing, None, range(2), scheduler=f"tcp://127.0.0.1:{port}", timeout=0.5))
     for address in (f"tcp://127.0.0.1:{port}", "127.0.0.1", "nonsense://1", " "):
         with pytest.raises(InputError, match=f"no answer from the scheduler {address}"):
-            list(results(failing, None, range(2), address, timeout=0.5))
+            list(results(failing, None, range(2), scheduler=address, timeout=0.5))
 
 
 def test_no_workers():
@@ -121,10 +124,10 @@ def test_no_workers():
         dask.LocalCluster(n_workers=0, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1") as empty,
         pytest.raises(InputError, match=r"no answer from the scheduler .* or its workers"),
     ):
-        list(results(failing, None, range(2), empty.scheduler_address, timeout=0.5))
+        list(results(failing, None, range(2), scheduler=empty.scheduler_address, timeout=0.5))
 
 
 def test_without_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"pip install symgen\[scale\]"):
-        list(results(failing, None, range(2), "tcp://127.0.0.1:1"))
+        list(results(failing, None, range(2), scheduler="tcp://127.0.0.1:1"))

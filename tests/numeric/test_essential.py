@@ -8,8 +8,8 @@ import pytest
 from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 
 from runtime.errors import SettingsError
-from runtime.estimators import estimate
-from runtime.estimators.essential import essential
+from runtime.estimators.essential import essential_of
+from runtime.estimators.methods import estimate_of
 from runtime.settings.study import EssentialSettings, EstimateSettings
 
 
@@ -37,50 +37,50 @@ def eliminated(seen, threshold):
 @pytest.mark.parametrize("threshold", [1.02, 1.04, 1.3])
 def test_trail_equals_refitting(threshold):
     seen = observation(noise=(1.5, 1.5), seed=2, X=TRUE * np.where(np.arange(10) == 5, 0.01, 1))
-    found = essential(seen, EssentialSettings(threshold))
+    found = essential_of(seen, EssentialSettings(threshold))
     names, trail = eliminated(seen, threshold)
     assert list(found.names) == names
     assert [step.name for step in found.trail] == [name for name, _, _ in trail]
     assert np.allclose([(s.relative_sigma, s.ratio) for s in found.trail], [(r, q) for _, r, q in trail], rtol=1e-9)
     assert [step.removed for step in found.trail] == [True] * (len(trail) - 1) + [False]
     assert found.counts[threshold] == len(names)
-    again = estimate(seen, EstimateSettings(columns=found.names))
+    again = estimate_of(seen, EstimateSettings(columns=found.names))
     assert np.allclose(found.estimate.X, again.X, rtol=1e-10)
     assert np.allclose(found.estimate.sigma_corrected, again.sigma_corrected, rtol=1e-9)
 
 
 def test_counts_fall_with_the_threshold():
-    found = essential(observation(noise=(1.5, 1.5), seed=2), model=planar)
+    found = essential_of(observation(noise=(1.5, 1.5), seed=2), model=planar)
     counts = list(found.counts.values())
     assert (min(found.counts), max(found.counts)) == (1.02, 1.10)
     assert counts == sorted(counts, reverse=True)
     for threshold in (1.02, 1.06, 1.10):
-        assert found.counts[threshold] == len(essential(observation(noise=(1.5, 1.5), seed=2), EssentialSettings(threshold)).names)
+        assert found.counts[threshold] == len(essential_of(observation(noise=(1.5, 1.5), seed=2), EssentialSettings(threshold)).names)
     assert found.estimate.units["FV1"] == "N*m*s/rad"
 
 
 def test_zero_parameters_go_first():
     X = TRUE.copy()
     X[[2, 7]] = 0
-    found = essential(observation(noise=(0.3, 0.05), seed=3, X=X), estimate=WLS)
+    found = essential_of(observation(noise=(0.3, 0.05), seed=3, X=X), estimate=WLS)
     assert set(found.removed[:2]) == {"MY1", "MY2"}
     assert {"ZZ1R", "FV1", "FS1", "FV2", "FS2", "MX1R", "MX2"} <= set(found.names)
 
 
 def test_exact_data_keep_everything_that_acts():
-    found = essential(observation())
+    found = essential_of(observation())
     assert found.names == planar.BASE_PARAMETERS
 
 
 def test_rank_loss_removes_what_the_record_does_not_show():
-    found = essential(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)))
+    found = essential_of(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)))
     assert {"FV2", "FS2"} <= set(found.removed)
     assert found.all_parameters.status == "rank-deficient"
     assert found.estimate.status == "ok"
 
 
 def test_text_and_json():
-    found = essential(observation(noise=(1.5, 1.5), seed=2))
+    found = essential_of(observation(noise=(1.5, 1.5), seed=2))
     data = json.loads(found.to_json())
     assert data["names"] == list(found.names) and data["counts"]["1.04"] == len(found.names)
     assert "(kept)" in str(found) and "1.02:" in str(found)
@@ -88,5 +88,5 @@ def test_text_and_json():
 
 def test_methods_without_one_linear_system_are_refused():
     with pytest.raises(SettingsError, match="ols or wls"):
-        essential(observation(), estimate=EstimateSettings(method="didim"))
-    assert essential(observation(noise=(0.1, 0.1)), estimate=OLS).estimate.method == "ols"
+        essential_of(observation(), estimate=EstimateSettings(method="didim"))
+    assert essential_of(observation(noise=(0.1, 0.1)), estimate=OLS).estimate.method == "ols"

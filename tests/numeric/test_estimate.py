@@ -7,13 +7,14 @@ import planar_2r_model as planar
 import pytest
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
-from runtime.estimators import estimate
-from runtime.estimators.estimate import Estimate, json_text
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import estimate_of
+from runtime.json_documents import json_text
 
 
 @pytest.fixture(scope="module")
 def found():
-    return estimate(observation(noise=(0.3, 0.05), seed=1), OLS, model=planar, provenance={"seed": 1})
+    return estimate_of(observation(noise=(0.3, 0.05), seed=1), OLS, model=planar, provenance={"seed": 1})
 
 
 def no_constant(name):
@@ -31,7 +32,7 @@ def test_json_round_trip(found):
 
 
 def test_json_of_rank_loss_has_null_and_no_nan():
-    lost = estimate(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)), WLS, model=planar)
+    lost = estimate_of(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)), WLS, model=planar)
     data = json.loads(lost.to_json(), parse_constant=no_constant)
     assert data["status"] == "rank-deficient" and data["cond"] is None
     assert None in data["sigma"] and None in data["relative_sigma"]

@@ -11,10 +11,11 @@ from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 from scipy.signal import lfilter
 
 from runtime.errors import SettingsError
-from runtime.estimators import LINEAR, METHODS, estimate, linear_system
-from runtime.estimators.block_covariance import block_of_rows
+from runtime.estimators.block_covariance import block_covariance
+from runtime.estimators.methods import LINEAR, METHODS, estimate_of, linear_system
 from runtime.estimators.solution import null_groups, solve
 from runtime.observation.qr_factor import combine, factor
+from runtime.observation.system import split_rows
 from runtime.settings.study import EstimateSettings
 
 EVERY = [OLS, WLS, EstimateSettings(method="wls", weights="iterated"), EstimateSettings(method="wls", weights="covariance")]
@@ -23,20 +24,20 @@ KINDS = ["ols", "wls", "wls iterated", "wls covariance"]
 
 @pytest.mark.parametrize("settings", EVERY[:3], ids=KINDS[:3])
 def test_exact_data_return_the_parameters(settings):
-    found = estimate(observation(), settings, model=planar)
+    found = estimate_of(observation(), settings, model=planar)
     assert found.status == "ok"
     assert np.allclose(found.X, TRUE, rtol=1e-9, atol=0)  # cond 1e2, rounding 1e-16
     assert found.relative_error < 1e-10
 
 
 def test_exact_data_have_no_residual_covariance():
-    found = estimate(observation(), EVERY[3])
+    found = estimate_of(observation(), EVERY[3])
     assert np.allclose(found.X, TRUE, rtol=1e-9, atol=0)
 
 
 @pytest.mark.parametrize("settings", EVERY, ids=KINDS)
 def test_noisy_data_stay_within_five_deviations(settings):
-    found = estimate(observation(noise=(0.3, 0.05), seed=4), settings)
+    found = estimate_of(observation(noise=(0.3, 0.05), seed=4), settings)
     assert np.all(np.abs(found.X - TRUE) < 5 * found.sigma)
 
 
@@ -44,7 +45,7 @@ def test_ordinary_equals_lstsq_and_its_formulas():
     seen = observation(noise=(0.3, 0.05), seed=1)
     W, Y = seen.W, seen.Y
     X, *_ = np.linalg.lstsq(W, Y, rcond=None)
-    found = estimate(seen, OLS)
+    found = estimate_of(seen, OLS)
     variance = np.sum((Y - W @ X) ** 2) / (len(Y) - 10)  # eq. (9)
     covariance = variance * np.linalg.inv(W.T @ W)  # eq. (10), the textbook form: an oracle, not the method
     assert np.allclose(found.X, X, rtol=1e-11)
@@ -69,7 +70,7 @@ def test_weighted_equals_lstsq_of_divided_rows():
         scale.append(np.sqrt(square[0] / (300 - rank)))
     s = np.repeat(scale, 300)
     X, *_ = np.linalg.lstsq(seen.W / s[:, None], seen.Y / s, rcond=None)
-    found = estimate(seen, WLS)
+    found = estimate_of(seen, WLS)
     assert np.allclose([fit.scale for fit in found.per_joint], scale, rtol=1e-10)
     assert np.allclose(found.X, X, rtol=1e-10)
     assert np.allclose(found.covariance, np.linalg.inv((seen.W / s[:, None] ** 2).T @ seen.W), rtol=1e-8)
@@ -83,7 +84,7 @@ def test_covariance_weights_equal_generalised_least_squares():
     E = (seen.Y - seen.W @ X).reshape(2, -1)
     V = np.kron(np.linalg.inv(E @ E.T / (300 - 10 / 2)), np.eye(300))
     expected = np.linalg.solve(seen.W.T @ V @ seen.W, seen.W.T @ V @ seen.Y)
-    found = estimate(seen, EVERY[3])
+    found = estimate_of(seen, EVERY[3])
     assert np.allclose(found.X, expected, rtol=1e-9)
     assert np.allclose(found.covariance, np.linalg.inv(seen.W.T @ V @ seen.W), rtol=1e-8)
 
@@ -93,7 +94,7 @@ def test_stated_sigma_matches_the_scatter_of_200_runs():
     low, high = 131.4, 287.4  # scipy.stats.chi2.ppf([5e-5, 1 - 5e-5], 200)
     for settings, stated in ((OLS, "sigma"), (WLS, "sigma"), (OLS, "sigma_corrected")):
         noise = (0.2, 0.2) if settings is OLS else (0.4, 0.03)
-        fits = [estimate(observation(N=150, noise=noise, seed=s), settings) for s in range(200)]
+        fits = [estimate_of(observation(N=150, noise=noise, seed=s), settings) for s in range(200)]
         z2 = np.array([((fit.X - TRUE) / getattr(fit, stated)) ** 2 for fit in fits]).sum(axis=0)
         slack = 1.15 if stated == "sigma_corrected" else 1.02  # sigma itself is estimated, from 30 blocks: t instead of normal
         assert np.all(z2 > low / slack) and np.all(z2 < high * slack), (stated, z2)
@@ -106,7 +107,7 @@ def test_corrected_sigma_follows_correlated_residuals():
     def colour(white):
         return np.sqrt(1 - a**2) * lfilter([1], [1, -a], white, axis=1)
 
-    fits = [estimate(observation(N=600, rate=30, noise=(0.3, 0.3), seed=s, colour=colour), OLS) for s in range(200)]
+    fits = [estimate_of(observation(N=600, rate=30, noise=(0.3, 0.3), seed=s, colour=colour), OLS) for s in range(200)]
     scatter = np.std([fit.X for fit in fits], axis=0, ddof=1)
     stated = np.mean([fit.sigma for fit in fits], axis=0)
     corrected = np.mean([fit.sigma_corrected for fit in fits], axis=0)
@@ -114,13 +115,48 @@ def test_corrected_sigma_follows_correlated_residuals():
     assert np.all(scatter / corrected < 1.35) and np.all(scatter / corrected > 0.75)
 
 
+def test_corrected_sigma_with_as_many_parameters_as_blocks():
+    """60 parameters, 50 blocks, residuals correlated by 0.8 from row to row: the jackknife states the scatter, blocks as they are 0.8 of it."""
+    rng = np.random.default_rng(11)
+    N, b, K, runs = 1000, 60, 50, 80
+    r, W = 2 * N, np.vstack([lfilter([1], [1, -0.9], rng.standard_normal((N, b)), axis=0) for _ in range(2)])
+    blocks, T = np.tile(np.repeat(np.arange(K), N // K), 2), np.linalg.inv(np.linalg.qr(W, mode="r"))
+    found, jackknife, plain = [], [], []
+    for _ in range(runs):
+        Y = lfilter([0.6], [1, -0.8], rng.standard_normal((2, N + 100)))[:, 100:].ravel()
+        X = T @ T.T @ (W.T @ Y)
+        found.append(X)
+        jackknife.append(np.diag(block_covariance(split_rows(np.column_stack([W, Y]), blocks), X, T)))
+        g = np.array([rows[:, :-1].T @ (rows[:, -1] - rows[:, :-1] @ X) for rows in split_rows(np.column_stack([W, Y]), blocks)]) @ T @ T.T
+        plain.append((g**2).sum(axis=0) * K / (K - 1) * (r - 1) / (r - b))
+    real = np.var(found, axis=0, ddof=1)
+    assert np.median(np.sqrt(np.mean(jackknife, axis=0) / real)) == pytest.approx(1.0, abs=0.1)
+    assert np.median(np.sqrt(np.mean(plain, axis=0) / real)) < 0.85
+
+
+def test_corrected_sigma_is_that_of_estimates_without_one_block():
+    """The jackknife from its definition, with the weights of the joints; nothing where one block alone determines a parameter."""
+    seen = observation(N=120, noise=(0.4, 0.03), seed=8)
+    settings = EstimateSettings("wls", options={"block": 0.5})
+    fit = estimate_of(seen, settings)
+    s, blocks = np.repeat([joint.scale for joint in fit.per_joint], 120), seen.blocks(0.5)
+    K = blocks.max() + 1
+    W, Y = seen.W / s[:, None], seen.Y / s
+    without = np.array([np.linalg.lstsq(W[blocks != k], Y[blocks != k], rcond=None)[0] for k in range(K)])
+    assert np.allclose(fit.sigma_corrected, np.sqrt((K - 1) / K * ((without - fit.X) ** 2).sum(axis=0)), rtol=1e-8)
+    W = seen.W.copy()
+    W[:, seen.names.index("FS2")] = np.where(blocks == 2, W[:, seen.names.index("FS2")], 0.0)
+    alone = estimate_of(replace(seen, W=W), settings)
+    assert np.isnan(alone.sigma_corrected).sum() == 1 and np.isnan(alone.sigma_corrected[alone.names.index("FS2")])
+
+
 def test_blocks_gather_all_joints_of_an_interval():
     seen = observation(N=40, rate=10)
-    blocks = block_of_rows(seen, 1.0)
+    blocks = seen.blocks(1.0)
     assert np.array_equal(blocks[:40], np.repeat(np.arange(4), 10))
     assert np.array_equal(blocks[:40], blocks[40:])
     two = replace(seen, record=np.tile(np.repeat([0, 1], 20), 2))
-    assert len(set(block_of_rows(two, 1.5))) == 4  # 2 s each: no block spans two records
+    assert len(set(two.blocks(1.5))) == 4  # 2 s each: no block spans two records
 
 
 @given(st.floats(1e-4, 1e4), st.floats(1e-4, 1e4), st.integers(0, 1000))
@@ -128,16 +164,16 @@ def test_weighted_estimate_ignores_the_scale_of_a_joint(c1, c2, seed):
     seen = observation(N=80, noise=(0.3, 0.05), seed=seed)
     c = np.repeat([c1, c2], 80)
     scaled = replace(seen, W=seen.W * c[:, None], Y=seen.Y * c)
-    first, second = estimate(seen, WLS), estimate(scaled, WLS)
+    first, second = estimate_of(seen, WLS), estimate_of(scaled, WLS)
     assert np.allclose(first.X, second.X, rtol=1e-9)
     assert np.allclose(first.sigma, second.sigma, rtol=1e-9)
 
 
 def test_iterated_weights_reach_a_fixed_point():
-    found = estimate(observation(noise=(0.4, 0.03), seed=5), EVERY[2])
+    found = estimate_of(observation(noise=(0.4, 0.03), seed=5), EVERY[2])
     assert found.status == "ok" and 1 <= found.iterations < 10
     assert np.allclose([fit.scale for fit in found.per_joint], [fit.sigma_rho for fit in found.per_joint], rtol=2e-3)
-    stopped = estimate(observation(noise=(0.4, 0.03), seed=5), replace(EVERY[2], options={"passes": 1}))
+    stopped = estimate_of(observation(noise=(0.4, 0.03), seed=5), replace(EVERY[2], options={"passes": 1}))
     assert stopped.status in ("ok", "not-converged")
 
 
@@ -171,7 +207,7 @@ def test_parts_combine_to_the_whole():
 @pytest.mark.parametrize("settings", EVERY[:3], ids=KINDS[:3])
 def test_rank_loss_names_the_parameters(settings):
     """Joint 2 at rest at q2 = 0: no friction of joint 2; inertias and first moments of the two links merge."""
-    found = estimate(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)), settings)
+    found = estimate_of(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)), settings)
     assert found.status == "rank-deficient"
     assert found.rank < 10
     assert {("FV2",), ("FS2",)} <= set(found.groups)
@@ -190,7 +226,7 @@ def test_rank_loss_groups_are_separate():
     W = seen.W.copy()
     W[:, 2] = 3e4 * W[:, 1]  # units must not matter
     W[:, 9] = 1e-3 * W[:, 8]
-    found = estimate(replace(seen, W=W), OLS)
+    found = estimate_of(replace(seen, W=W), OLS)
     assert found.rank == 8
     assert set(found.groups) == {("MX1R", "MY1"), ("FV2", "FS2")}
     assert "(MX1R, MY1)" in found.message
@@ -206,7 +242,7 @@ def test_null_groups_follow_the_projector_not_the_basis():
 
 def test_few_rows_are_a_status():
     seen = observation(N=5)
-    found = estimate(seen, OLS)
+    found = estimate_of(seen, OLS)
     assert found.status in ("no-redundancy", "rank-deficient")
     assert np.all(np.isnan(found.sigma))
     assert found.message
@@ -216,7 +252,7 @@ def test_few_rows_are_a_status():
 def test_a_joint_without_rows_is_left_out(settings):
     """All rows of joint 1 dropped (low speed): friction of joint 1 has no effect, the rest is estimated from joint 2."""
     seen = observation(noise=(0.1, 0.1)).where(np.repeat([False, True], 300))
-    found = estimate(seen, settings)
+    found = estimate_of(seen, settings)
     assert [fit.rows for fit in found.per_joint] == [0, 300]
     assert found.status == "rank-deficient"
     assert {("FV1",), ("FS1",), ("ZZ1R",)} <= set(found.groups)
@@ -227,7 +263,7 @@ def test_a_joint_without_rows_is_left_out(settings):
 def test_columns_restrict_the_estimate():
     seen = observation(noise=(0.1, 0.1))
     kept = ("ZZ1R", "FV1", "FS1", "MX1R", "ZZ2", "MX2", "FV2", "FS2")
-    found = estimate(seen, EstimateSettings(columns=kept))
+    found = estimate_of(seen, EstimateSettings(columns=kept))
     fresh, *_ = np.linalg.lstsq(seen.W[:, [seen.names.index(name) for name in kept]], seen.Y, rcond=None)
     assert found.names == kept
     assert np.allclose(found.X, fresh, rtol=1e-10)
@@ -245,7 +281,7 @@ def test_columns_restrict_the_estimate():
 )
 def test_wrong_settings_say_what_to_do(settings, text):
     with pytest.raises(SettingsError, match=text):
-        estimate(observation(N=50), settings)
+        estimate_of(observation(N=50), settings)
 
 
 def test_covariance_weights_need_every_joint_at_every_instant():
@@ -253,7 +289,7 @@ def test_covariance_weights_need_every_joint_at_every_instant():
     keep = np.r_[0:50, 55:100]
     short = replace(seen, W=seen.W[keep], Y=seen.Y[keep], rows=(50, 45), t=seen.t[keep], record=seen.record[keep])
     with pytest.raises(SettingsError, match="50, 45"):
-        estimate(short, EVERY[3])
+        estimate_of(short, EVERY[3])
 
 
 def test_wrong_shapes_name_both():

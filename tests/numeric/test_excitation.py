@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import estimate
-from runtime.excitation.criteria import excesses, limits_of, observed, usage, weights_of
-from runtime.excitation.search import Problem, _search, excite, one_start, smoothed
+from runtime.estimators.methods import estimate_of
+from runtime.excitation.criteria import excesses, limits_of, planned, usage, weights_of
+from runtime.excitation.optimiser import Problem, improved, one_start, smoothed
+from runtime.excitation.search import excite
 from runtime.model.casadi import load_symbolic
 from runtime.model.generated import load_model
+from runtime.motion.dry_friction import dry_friction
 from runtime.observation.observation import observe
 from runtime.records.record import Record
 from runtime.settings.excitation import ExcitationSettings, Sphere
@@ -36,6 +38,7 @@ def planar(tmp_path_factory: pytest.TempPathFactory) -> tuple[object, str, np.nd
         (folder / name).write_text(text, encoding="utf-8")
     model = load_model(folder / "planar_2r.py")
     standard = {name: {**VALUES, **FRICTION}.get(name, 0.0) for name in model.STANDARD_PARAMETERS}  # type: ignore[attr-defined]
+    model.VALUES = standard
     return model, str(folder / "planar_2r_casadi.py"), np.asarray(model.base_parameters(standard))  # type: ignore[attr-defined]
 
 
@@ -48,9 +51,7 @@ def settings(**changes: object) -> ExcitationSettings:
 
 
 def search(planar: tuple, asked: ExcitationSettings) -> object:
-    model, path, X = planar
-    weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
-    return excite(model, path, STUDY, asked, weights, limits_of(model, asked.limits), X)
+    return excite(planar[0], study=replace(STUDY, excitation=asked))
 
 
 def test_smooth_sign_is_tanh_and_nothing_else_changes(planar: tuple) -> None:
@@ -82,9 +83,9 @@ def test_motion_within_limits_and_better_than_the_start(planar: tuple, criterion
     assert np.abs(qd).max() < 1e-5
     assert np.abs(qdd).max() < 1e-4
     weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
-    first = one_start(Problem(path, replace(asked, iterations=1), weights, limits, X), 0)
-    begun = observed(model, motion_from_mapping(first.motion), STUDY, asked.rate)
-    seen = observed(model, found.motion, STUDY, asked.rate)
+    first = one_start(Problem(path, replace(asked, iterations=1), weights, limits, X, dry_friction(model).smooth), 0)
+    begun = planned(model, motion_from_mapping(first.motion), STUDY, asked.rate)
+    seen = planned(model, found.motion, STUDY, asked.rate)
     assert weights.relative_sigma(seen).max() < 0.8 * weights.relative_sigma(begun).max()
     assert found.condition == pytest.approx(np.linalg.cond(weights.matrix(seen)))
     parts = found.motion.parts
@@ -103,7 +104,7 @@ def test_prediction_is_what_identification_finds(planar: tuple) -> None:
     estimates = []
     for _ in range(60):
         record = Record(t=t, q=q, tau=clean + deviations * rng.standard_normal(clean.shape), rate=1000.0)
-        estimates.append(estimate(observe(model, record, asked), asked.estimate, model=model).X)
+        estimates.append(estimate_of(observe(model, record, asked), asked.estimate, model=model).X)
     size = weights_of(model, settings(), dict(zip(model.BASE_PARAMETERS, X, strict=True))).size
     scatter = 100 * np.std(estimates, axis=0, ddof=1) / size
     ratio = scatter / np.array(list(found.relative_sigma.values()))
@@ -123,13 +124,29 @@ def test_torque_limits_hold(planar: tuple) -> None:
     model, _, X = planar
     free = search(planar, settings())
     largest = np.abs(model.inverse_dynamics(*free.motion.sampled(1000.0)[1:], X)).max(axis=0)
-    asked = settings(
-        limits={**LIMITS, "tau": (0.8 * largest).tolist()}, torque_rms=(0.5 * largest).tolist(), smooth=0.02, iterations=200
-    )
+    asked = settings(limits={**LIMITS, "tau": (0.8 * largest).tolist()}, torque_rms=(0.5 * largest).tolist(), smooth=0.02, iterations=200)
     found = search(planar, asked)
     tau = model.inverse_dynamics(*found.motion.sampled(1000.0)[1:], X)
     assert np.all(np.abs(tau).max(axis=0) <= 0.8 * largest)
     assert np.all(np.sqrt(np.mean(tau**2, axis=0)) <= 0.5 * largest)
+
+
+def test_torque_rate_leaves_the_jump_of_dry_friction_out(planar: tuple) -> None:
+    """A reversal of joint 1 switches 2 * 2 N m of dry friction between two samples: 4000 N m/s at 1 kHz, whatever the motion does."""
+    model, _, X = planar
+    free = search(planar, settings())
+    t, q, qd, qdd, tau = free.sampled()
+    assert (np.diff(np.sign(qd[:, 0])) != 0).any() and np.abs(np.gradient(tau, t, axis=0)).max() > 1500
+    smooth = model.inverse_dynamics(q, qd, qdd, X * dry_friction(model).smooth)
+    largest = np.abs(np.gradient(smooth, t, axis=0)).max(axis=0)
+    assert np.all(largest < 500)
+    assert excesses(model, free.motion, free.limits, settings(torque_rate=(1.01 * largest).tolist()), X) == []
+    (excess,) = excesses(model, free.motion, free.limits, settings(torque_rate=[0.9 * largest[0], 1.01 * largest[1]]), X)
+    assert (excess.what, excess.joint) == ("rate of torque", 1) and excess.value == pytest.approx(largest[0])
+    limited = search(planar, settings(torque_rate=(0.8 * largest).tolist(), iterations=100))
+    t, q, qd, qdd, _ = limited.sampled()
+    rate = np.gradient(model.inverse_dynamics(q, qd, qdd, X * dry_friction(model).smooth), t, axis=0)
+    assert np.all(np.abs(rate).max(axis=0) <= 0.8 * largest)
 
 
 def test_spheres_stay_apart(planar: tuple) -> None:
@@ -140,6 +157,22 @@ def test_spheres_stay_apart(planar: tuple) -> None:
     T = model.frame_poses(found.motion.sampled(500.0)[1])
     tip = T[:, -1, :3, :3] @ np.array([0.4, 0.0, 0.0]) + T[:, -1, :3, 3]
     assert np.linalg.norm(tip, axis=1).min() >= 0.45 - 1e-3
+
+
+def test_a_record_gives_parameters_and_a_motion_to_compare_with(planar: tuple) -> None:
+    model, _, X = planar
+    t = np.arange(4000) / 1000
+    q = np.column_stack([0.3 * np.sin(2 * t), 0.4 * np.sin(3 * t)])
+    qd, qdd = np.gradient(q, t, axis=0), np.gradient(np.gradient(q, t, axis=0), t, axis=0)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(q.shape)
+    record = Record(t=t, q=q, tau=model.inverse_dynamics(q, qd, qdd, X) + noise, rate=1000.0, name="slow")
+    asked = settings(torque_sigma=None, columns=["ZZ1R", "ZZ2", "FV1", "FV2"], iterations=20)
+    found = excite(model, record, replace(STUDY, excitation=asked))
+    summary = found.summary()
+    assert summary["parameters_from"] == "estimate of slow" and summary["cond_of_record"] == found.known.condition
+    assert set(found.relative_sigma) == set(found.known.relative_sigma) == {"ZZ1R", "ZZ2", "FV1", "FV2"}
+    assert found.condition < found.known.condition
+    assert "motion of the record" in str(found) and found.to_csv().startswith("t,q1,q2,qd1,qd2,qdd1,qdd2\n")
 
 
 def test_what_cannot_be_is_said(planar: tuple) -> None:
@@ -162,8 +195,8 @@ def test_a_wider_margin_starts_from_the_motion_found(planar: tuple) -> None:
     model, path, X = planar
     asked = settings()
     weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
-    problem = Problem(path, asked, weights, limits_of(model, asked.limits), X)
+    problem = Problem(path, asked, weights, limits_of(model, asked.limits), X, dry_friction(model).smooth)
     start = one_start(problem, 0)
     motion = motion_from_mapping(start.motion)
-    again = _search(problem, 0, Motion(tuple(Part(p.family, p.p) for p in motion.parts)))
+    again = improved(problem, 0, Motion(tuple(Part(p.family, p.p) for p in motion.parts)))
     assert again.criterion <= start.criterion + 1e-3

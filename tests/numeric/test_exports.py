@@ -17,9 +17,9 @@ import scipy.io
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime import InputError
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.estimators.estimate import Estimate, load_estimate
-from runtime.json_documents import KINDS, schema_text
+from runtime.json_documents import schema_text
 from runtime.latex import escaped, level_cell, name_cell, number_cell, unit_cell
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays, mat, matlab_names, npz
 from runtime.resolution.result import Cestac, Level, Run, Runs, level_result
@@ -30,7 +30,7 @@ NUMBERS = ("X", "sigma", "covariance", "sigma_corrected", "relative_sigma")
 
 @pytest.fixture(scope="module")
 def found():
-    return estimate(observation(noise=(0.3, 0.05), seed=1), OLS, model=planar, provenance={"seed": 1})
+    return estimate_of(observation(noise=(0.3, 0.05), seed=1), OLS, model=planar, provenance={"seed": 1})
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def hostile(fit: Estimate) -> Estimate:
 
 
 def test_schemas_hold_for_what_is_written(found, study):
-    lost = estimate(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)), WLS, model=planar)
+    lost = estimate_of(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)), WLS, model=planar)
     for kind, results in (("estimate", (found, lost, hostile(found))), ("cestac", (study,))):
         schema = json.loads(schema_text(kind))
         jsonschema.Draft202012Validator.check_schema(schema)
@@ -63,7 +63,6 @@ def test_schemas_hold_for_what_is_written(found, study):
                 jsonschema.validate(data | {"schema": 1}, schema)
             with pytest.raises(jsonschema.ValidationError):
                 jsonschema.validate({k: v for k, v in data.items() if k != "names"}, schema)
-    assert set(KINDS) == {"estimate", "cestac"}
 
 
 def test_an_estimate_comes_back_to_the_bit(found, tmp_path):
@@ -83,9 +82,9 @@ def test_an_estimate_comes_back_to_the_bit(found, tmp_path):
         (lambda d: {"schema": "symgen-cestac/1"}, "expected 'symgen-estimate/1'"),
         (lambda d: {"schema": 1}, "expected 'symgen-estimate/1'"),
         (lambda d: {"X": d["X"][:-1]}, "X has shape"),
-        (lambda d: {"X": ["a"] * 10}, "X:"),
+        (lambda d: {"X": ["a"] * 10}, "X[0]: 'a'; expected a number"),
         (lambda d: {"names": [1] * 10}, "expected a text"),
-        (lambda d: {"per_joint": [{"joint": "1"}]}, "per_joint:"),
+        (lambda d: {"per_joint": [{"joint": "1"}]}, "per_joint[0]: no key rows"),
         (lambda d: {"settings": []}, "expected a mapping"),
     ],
 )

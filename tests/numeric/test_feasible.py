@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import builtins
 from dataclasses import replace
 from pathlib import Path
 
+import clarabel
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -13,11 +13,12 @@ from scipy.optimize import minimize
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
 from runtime.errors import SettingsError
-from runtime.estimators import estimate
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.feasibility import Ellipsoid, Limits, feasibility, limit_rows, standard_parameters
+from runtime.estimators.feasibility import Ellipsoid, Limits, feasibility, limit_rows, pulled, scales, standard_parameters
 from runtime.estimators.feasible import FeasibleOptions, linear, residual_norm, weighed
+from runtime.estimators.methods import estimate_of
 from runtime.estimators.physical import negative_elements
+from runtime.estimators.semidefinite import closest, everything
 from runtime.identification.validation import split_validation
 from runtime.model.generated import load_model
 from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
@@ -96,8 +97,8 @@ def test_signs_that_no_drive_has(arm, tx40) -> None:
     """Friction below zero is named where it is so beyond its deviation; offsets, inertias of sums and forms have no sign of their own."""
     X = arm.base_parameters(dict.fromkeys(arm.STANDARD_PARAMETERS, 1.0) | {"FS2": -1.0, "OFFSET1": -1.0})
     for noise, named in ((0.1, ("FS2",)), (1000.0, ())):
-        assert negative_elements(arm, estimate(simulated(arm, X, noise), EstimateSettings(), model=arm)) == named
-    wrist = {*negative_elements(tx40, estimate(simulated(tx40, -np.ones(60), 0.1), EstimateSettings(), model=tx40))}
+        assert negative_elements(arm, estimate_of(simulated(arm, X, noise), EstimateSettings(), model=arm)) == named
+    wrist = {*negative_elements(tx40, estimate_of(simulated(tx40, -np.ones(60), 0.1), EstimateSettings(), model=tx40))}
     assert {"Ia3", "FV1", "FSM6"} <= wrist and not {"Ia6", "FVM6", "OFFSET1", "ZZ1R"} & wrist
 
 
@@ -107,7 +108,7 @@ def test_feasible_is_least_squares_where_that_is_feasible(name: str) -> None:
     model = emitted(name)
     truth = model.base_parameters(model.VALUES)
     seen = simulated(model, truth, 1e-4)
-    ols, found = estimate(seen), estimate(seen, FEASIBLE, model=model)
+    ols, found = estimate_of(seen), estimate_of(seen, FEASIBLE, model=model)
     assert found.details["least_squares"]["feasible"]
     np.testing.assert_array_equal(found.X, ols.X)
     physical, options = physical_model(model), FeasibleOptions(margin=1e-9)
@@ -117,7 +118,7 @@ def test_feasible_is_least_squares_where_that_is_feasible(name: str) -> None:
 
 def test_noise_free_records_give_the_parameters_back(tx40) -> None:
     truth = tx40.base_parameters(tx40.VALUES)
-    found = estimate(simulated(tx40, truth, 0.0), FEASIBLE, model=tx40)
+    found = estimate_of(simulated(tx40, truth, 0.0), FEASIBLE, model=tx40)
     np.testing.assert_allclose(found.X, truth, atol=1e-9)
     standard = np.array(list(found.details["standard"].values()))
     np.testing.assert_allclose(standard, values(tx40), atol=1e-6)  # nearest to the values, and these have the torques
@@ -129,7 +130,7 @@ def test_optimum_is_that_of_a_parametrisation_of_all_physical_arms(arm) -> None:
     X = X + np.array([0, 0, 0, 0, 0, 0, -0.1, 0, 0, -0.01, -0.35, 0, 0])  # ZZ2 too small for MX2, FV2 below zero
     seen = simulated(arm, X, 0.5, N=60)
     settings = EstimateSettings("feasible", options={"bootstrap": 0, "total_mass": 4.0, "margin": 1e-9})
-    found = estimate(seen, settings, model=arm)
+    found = estimate_of(seen, settings, model=arm)
     assert found.status == "ok" and not found.details["least_squares"]["feasible"]
     lower = np.tril_indices(4)
 
@@ -205,7 +206,7 @@ def test_held_out_weight_is_that_of_the_best_mutual_prediction(arm) -> None:
     options = {"bootstrap": 0, "prior": "euclidean", "weight": "held-out"}
     right, wrong = replace_values(arm), replace_values(arm)
     wrong.VALUES = {name: 3 * x for name, x in right.VALUES.items()}
-    weights = [estimate(seen, EstimateSettings("feasible", options=options), model=m).details["weight"] for m in (right, wrong)]
+    weights = [estimate_of(seen, EstimateSettings("feasible", options=options), model=m).details["weight"] for m in (right, wrong)]
     assert weights[0] > 10 * weights[1]
 
 
@@ -213,11 +214,11 @@ def test_held_out_weight_is_that_of_the_best_mutual_prediction(arm) -> None:
 def test_a_strong_pull_ends_at_the_values_and_auto_costs_one_per_cent(arm, prior: str) -> None:
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.5)
     solid = replace_values(arm)
-    free = estimate(seen, EstimateSettings("feasible", options={"bootstrap": 0}), model=solid)
-    strong = estimate(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": prior, "weight": 1e4}), model=solid)
+    free = estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0}), model=solid)
+    strong = estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": prior, "weight": 1e4}), model=solid)
     inertial = [f"{family}{j}" for j in (1, 2) for family in INERTIAL]
     assert max(abs(strong.details["standard"][name] - solid.VALUES[name]) for name in inertial) < 1e-3
-    auto = estimate(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": prior}), model=solid)
+    auto = estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": prior}), model=solid)
     assert free.residual_norm <= auto.residual_norm <= 1.0101 * free.residual_norm and auto.details["weight"] > 0
 
 
@@ -232,15 +233,15 @@ def replace_values(arm):
 def test_bootstrap_is_seeded_and_has_the_size_of_the_scatter(arm) -> None:
     truth = arm.base_parameters(arm.VALUES)
     settings = EstimateSettings("feasible", options={"bootstrap": 12, "seed": 3})
-    first, again = (estimate(simulated(arm, truth, 0.3), settings, model=arm) for _ in range(2))
+    first, again = (estimate_of(simulated(arm, truth, 0.3), settings, model=arm) for _ in range(2))
     np.testing.assert_array_equal(first.sigma_corrected, again.sigma_corrected)
-    runs = np.array([estimate(simulated(arm, truth, 0.3, seed), FEASIBLE, model=arm).X for seed in range(20)])
+    runs = np.array([estimate_of(simulated(arm, truth, 0.3, seed), FEASIBLE, model=arm).X for seed in range(20)])
     ratio = np.median(first.sigma_corrected / runs.std(axis=0))
     assert 0.5 < ratio < 2  # 12 resampled records and 20 new ones: 27 % at one deviation
 
 
 def test_json_keeps_the_standard_parameters(arm) -> None:
-    found = estimate(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
+    found = estimate_of(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
     back = Estimate.from_json(found.to_json())
     assert back.details["standard"] == pytest.approx(found.details["standard"])
 
@@ -269,50 +270,75 @@ def test_json_keeps_the_standard_parameters(arm) -> None:
 def test_what_cannot_be_asked(arm, options: dict, said: str) -> None:
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.1)
     with pytest.raises(InputError, match=said):
-        estimate(seen, EstimateSettings("feasible", options={"bootstrap": 0, **options}), model=arm)
+        estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0, **options}), model=arm)
 
 
 def test_needs_the_model_and_values_for_a_pull(arm) -> None:
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.1)
     with pytest.raises(InputError, match="needs the model"):
-        estimate(seen, FEASIBLE)
+        estimate_of(seen, FEASIBLE)
     with pytest.raises(SettingsError, match="no values of"):
-        estimate(
+        estimate_of(
             simulated(emitted("rx90"), np.ones(len(emitted("rx90").BASE_PARAMETERS)), 1.0),
             EstimateSettings("feasible", options={"prior": "euclidean", "bootstrap": 0}),
             model=emitted("rx90"),
         )
 
 
-def test_without_the_extra_one_line_says_so(arm, monkeypatch) -> None:
-    real = builtins.__import__
-
-    def without(name, *args, **kwargs):
-        if name == "cvxpy":
-            raise ImportError(name)
-        return real(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(InputError, match=r"pip install symgen\[consistency\]"):
-        estimate(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
-
-
 def test_a_solver_that_fails_is_told(arm, monkeypatch) -> None:
-    import cvxpy
+    """One step of the interior point method solves nothing."""
 
-    def fails(self, **settings):
-        raise cvxpy.error.SolverError("no")
+    whole = clarabel.DefaultSolver
 
-    monkeypatch.setattr(cvxpy.Problem, "solve", fails)
-    with pytest.raises(InputError, match=r"was not solved \(Clarabel failed\); try another margin"):
-        estimate(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
+    def impatient(*problem):
+        problem[-1].max_iter = 1
+        return whole(*problem)
+
+    monkeypatch.setattr("runtime.estimators.semidefinite.clarabel.DefaultSolver", impatient)
+    with pytest.raises(InputError, match=r"was not solved \(Clarabel: MaxIterations\); try another margin"):
+        estimate_of(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
+
+
+@pytest.mark.parametrize("kind", ["euclidean", "entropic", "pullback"])
+def test_the_pull_is_at_its_minimum(arm, kind) -> None:
+    """Criterion written down from the definitions of the distances: no step towards another robot makes it smaller."""
+    physical = physical_model(arm)
+    prior = pulled(physical, kind, 1e-2)
+    rng = np.random.default_rng(3)
+    p = len(physical.standard)
+    R, z = rng.standard_normal((6, p)) / 3, rng.standard_normal(6) / 3
+    rows = limit_rows(physical, None)
+    chi = closest(R, z, physical.conditions, rows, everything(scales(physical)), least=1e-4, pull=prior).chi
+    links = [c for c in physical.conditions if c.name.startswith("link ")]
+
+    def criterion(x):
+        if kind == "euclidean":
+            numbers = list(prior.numbers)
+            distance = np.sum(((x - prior.chi0) / prior.scale)[numbers] ** 2)
+        else:
+            Ms = [np.linalg.solve(c.matrix(prior.chi0), c.matrix(x)) for c in links]
+            if kind == "entropic":
+                distance = sum(np.trace(M) - np.linalg.slogdet(M)[1] - 4 for M in Ms)
+            else:
+                distance = sum(np.trace((M - np.eye(4)) @ (M - np.eye(4))) / 2 for M in Ms)
+        return np.sum((R @ x - z) ** 2) + 1e-2 * distance
+
+    best, smallest = criterion(chi), min(physical.smallest(chi).values())
+    assert smallest > 1e-4 - 1e-9
+    tried = 0
+    for _ in range(2000):
+        inside = prior.chi0 * rng.uniform(0.5, 2) + scales(physical) * rng.normal(0, 10 ** rng.uniform(-4, -1), p)
+        if min(physical.smallest(inside).values()) >= 1e-4:
+            tried += 1
+            assert criterion(chi + 10 ** rng.uniform(-4, 0) * (inside - chi)) > best - 1e-10
+    assert tried > 50
 
 
 def test_essential_columns_alone_leave_the_others_free(arm) -> None:
     """With five columns the arm of the estimate has those five parameters and whatever else makes it an arm."""
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.1)
     names = ("ZZ1R", "MX1R", "FV1", "ZZ2", "MX2")
-    found = estimate(seen, replace(FEASIBLE, columns=names), model=arm)
+    found = estimate_of(seen, replace(FEASIBLE, columns=names), model=arm)
     assert found.names == names and min(found.details["smallest_eigenvalues"].values()) > 0
     chi = np.array(list(found.details["standard"].values()))
     np.testing.assert_allclose(physical_model(arm).rows(names) @ chi, found.X, atol=1e-10)
@@ -322,7 +348,7 @@ def test_tx40_record(tx40, tx40_data) -> None:
     """Least squares of the public record is infeasible; the feasible estimate costs less than 5 % (measured 0.24 %), and a robot has its torques."""
     study = study_from_mapping(dataset_study("tx40"))
     seen = observe(tx40, read_records(study.record, tx40)[0], study)
-    ols, found = estimate(seen), estimate(seen, FEASIBLE, model=tx40)
+    ols, found = estimate_of(seen), estimate_of(seen, FEASIBLE, model=tx40)
     told = found.details["least_squares"]
     assert not told["feasible"] and told["blocking"][0]["condition"] == "link 3" and "NOT physically feasible" in found.message
     assert 1 < found.relative_error / ols.relative_error < 1.05

@@ -17,7 +17,7 @@ from bag_files import joint_states, write_bag
 from campaign import sampled
 
 from runtime import load_model, observe
-from runtime.estimators.essential import essential
+from runtime.estimators.essential import essential_of
 from runtime.records.datasets import dataset_study, fetch
 from runtime.records.reading import read_records
 from runtime.settings.study import study_from_mapping
@@ -70,7 +70,7 @@ def estimates(model, path, columns, rate, *, stamps):
     time = {"columns": {**columns, "t": "1" if path.suffix == ".npy" else "t"}} if stamps else {"columns": columns, "rate": rate}
     study = study_from_mapping({**dataset_study("tx40"), "record": {"files": str(path), "side": "motor", **time}})
     (record,) = read_records(study.record, model)
-    found = essential(observe(model, record, study), study.essential, study.estimate, model=model)
+    found = essential_of(observe(model, record, study), study.essential, study.estimate, model=model)
     return found.all_parameters, found.estimate
 
 
@@ -121,7 +121,7 @@ def whole_record(folder):
     q, tau = measured()
     (record,) = read_records(study_from_mapping(dataset_study("tx40")).record, model)
     study = study_from_mapping(dataset_study("tx40"))
-    found = essential(observe(model, record, study), study.essential, study.estimate, model=model)
+    found = essential_of(observe(model, record, study), study.essential, study.estimate, model=model)
     expected = [found.all_parameters, found.estimate]
     for kind in FORMATS:
         path, columns = write(kind, folder, np.arange(len(q)) / 5000, q, tau)

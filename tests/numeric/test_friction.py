@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from runtime import InputError, Record, observe
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.identification.friction import friction_curves, own_friction
-from runtime.identification.friction_laws import correlation_time
+from runtime.identification.residuals import correlation_time, residual_correlation
 from runtime.model.generated import load_model
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
@@ -45,8 +45,8 @@ def simulated(arm, law, noise: float = 0.05, seconds: float = 40.0, seed: int = 
         rest[own_friction(arm, j)] = 0.0
     rigid = arm.inverse_dynamics(q, qd, qdd, rest)
     tau = rigid + law(qd, rigid) + noise * np.random.default_rng(seed).standard_normal(q.shape)
-    record = Record(t, q, tau, RATE)
-    fit = estimate(observe(arm, record, STUDY))
+    record = Record(t, q, tau, rate=RATE)
+    fit = estimate_of(observe(arm, record, STUDY))
     return record, type(fit)(**{**vars(fit), "X": X})
 
 
@@ -64,11 +64,11 @@ def test_own_friction_of_a_joint(arm) -> None:
 def test_plain_friction_is_left_alone(arm) -> None:
     record, fit = simulated(arm, coulomb)
     for curve in friction_curves(arm, [record], STUDY, fit):
-        assert curve.chosen == "coulomb+viscous" and curve.note == ""
+        assert curve.law_name == "coulomb+viscous" and curve.note == ""
         true = {"FS": 0.8, "FV": 0.5, "OFFSET": 0.1}
         for name, value in true.items():
             assert abs(curve.law.parameters[name] - value) < 4 * curve.law.sigma[name] + 2e-3
-        within = np.abs(curve.mean - curve.drawn["coulomb+viscous"]) < 1.3 * curve.half
+        within = np.abs(curve.mean - curve.law_torques["coulomb+viscous"]) < 1.3 * curve.half
         assert within.mean() > 0.85
 
 
@@ -78,7 +78,7 @@ def test_stribeck_friction_is_found(arm) -> None:
 
     record, fit = simulated(arm, law)
     for curve in friction_curves(arm, [record], STUDY, fit):
-        assert curve.chosen.startswith("stribeck") and "Stribeck effect" in curve.note and curve.label == curve.chosen
+        assert curve.law_name.startswith("stribeck") and "Stribeck effect" in curve.note and curve.label == curve.law_name
         stribeck = next(law for law in curve.laws if law.name == "stribeck")
         for name, value in {"FS": 0.8, "FV": 0.5, "FST": 0.6, "VS": 0.3}.items():
             assert abs(stribeck.parameters[name] - value) < 4 * stribeck.sigma[name] + 5e-3, name
@@ -88,7 +88,7 @@ def test_stribeck_friction_is_found(arm) -> None:
 def test_friction_under_load_is_found(arm) -> None:
     record, fit = simulated(arm, lambda v, rigid: coulomb(v, rigid) + 0.1 * np.sign(v) * np.abs(rigid))
     for curve in friction_curves(arm, [record], STUDY, fit):
-        assert curve.chosen in ("load", "stribeck+load")
+        assert curve.law_name in ("load", "stribeck+load")
         load = next(law for law in curve.laws if law.name == "load")
         assert load.parameters["FL"] == pytest.approx(0.1, abs=0.005) and load.held_out < 0.9 * curve.laws[0].held_out
 
@@ -106,8 +106,8 @@ def test_correlation_time_of_known_noise() -> None:
     x = np.zeros_like(e)
     for k in range(1, len(e)):
         x[k] = 0.8 * x[k - 1] + e[k]
-    assert correlation_time(x) == pytest.approx(9, rel=0.15)
-    assert correlation_time(e) == pytest.approx(1, abs=0.1)
+    assert correlation_time(residual_correlation(x)) == pytest.approx(9, rel=0.15)
+    assert correlation_time(residual_correlation(e)) == pytest.approx(1, abs=0.1)
 
 
 def test_emps_has_the_published_asymmetric_friction(emps_data) -> None:
@@ -115,9 +115,9 @@ def test_emps_has_the_published_asymmetric_friction(emps_data) -> None:
     emps = emitted("emps")
     study = study_from_mapping(dataset_study("emps"))
     records = read_records(study.record, emps)
-    fit = estimate(observe(emps, records[0], study), study.estimate, model=emps)
+    fit = estimate_of(observe(emps, records[0], study), study.estimate, model=emps)
     (curve,) = friction_curves(emps, records, study, fit)
-    assert curve.chosen == "asymmetric"
+    assert curve.law_name == "asymmetric"
     published = {"FVP": 166.7061, "FSP": 20.1440, "FVN": 240.4236, "FSN": 20.6277}
     for name, value in published.items():
         assert curve.law.parameters[name] == pytest.approx(value, rel=5e-4)
@@ -128,10 +128,10 @@ def test_tx40_record(tx40_data) -> None:
     tx40 = emitted("tx40")
     study = study_from_mapping(dataset_study("tx40"))
     records = read_records(study.record, tx40)
-    curves = friction_curves(tx40, records, study, estimate(observe(tx40, records[0], study), model=tx40))
+    curves = friction_curves(tx40, records, study, estimate_of(observe(tx40, records[0], study), model=tx40))
     assert [curve.joint for curve in curves] == list("123456")
     assert all(curve.law.held_out < curve.laws[0].held_out for curve in curves)
-    assert curves[2].chosen == "stribeck+load" and curves[2].law.held_out < 0.7 * curves[2].laws[0].held_out
+    assert curves[2].law_name == "stribeck+load" and curves[2].law.held_out < 0.7 * curves[2].laws[0].held_out
     assert all(curve.law.parameters["FST"] < 0 and "no Stribeck peak" in curve.note and "(no peak)" in curve.label for curve in curves)
     png = plots.png(friction_figure(curves))
     assert png[:4] == b"\x89PNG"

@@ -18,7 +18,7 @@ from runtime.model.compile_cache import NotCompiledError, cache_folder
 from runtime.model.compiled import CompiledModel
 from runtime.observation.filters import filtered_states, kept_samples
 from runtime.resolution.c import kernels as fused
-from runtime.resolution.c.kernels import Entries, FilteredStates, Room, constant_values, decimated
+from runtime.resolution.c.kernels import SignalEntries, FilteredStates, Room, constant_values, decimated
 from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.self_test import unavailable
 from runtime.settings.study import Decimate, Lowpass, Signals
@@ -87,7 +87,7 @@ def test_positions_moved_by_one_step():
     np.testing.assert_array_equal(found, right)
 
 
-def store(entries: Entries, y: Array) -> Array:
+def store(entries: SignalEntries, y: Array) -> Array:
     """Rows of signals as columns by joints, shape (b, n, K)."""
     filled = np.zeros((len(entries.names), entries.n, y.shape[1]))
     joints = np.repeat(np.arange(entries.n), np.diff(entries.start))
@@ -119,7 +119,7 @@ def test_decimated_signals_are_those_of_scipy(N, factor, phase, padding, planar)
     q = walk(N + 40, 2, seed=factor)
     settings, samples, room = Decimate(factor=factor, phase=phase, padding=padding), slice(17, 17 + N), Room()
     states = FilteredStates(q, RATE, PLAIN, room)
-    entries = Entries(planar, planar.BASE_PARAMETERS)
+    entries = SignalEntries(planar, planar.BASE_PARAMETERS)
     y = decimated(entries, states, samples, factor, settings, constant_values(planar, {}), room)
     expected = filtered_states(q, RATE, PLAIN)[samples]
     D = planar.module.regressor(expected.q, expected.qd, expected.qdd).transpose(2, 1, 0)
@@ -137,7 +137,7 @@ def test_random_robots_entry_by_entry(seed, tmp_path):
     names = tuple(rng.permutation(model.BASE_PARAMETERS)[: max(2, len(model.BASE_PARAMETERS) - 3)].tolist())
     changed = {name: value + 0.1 for name, value in list(model.CONSTANTS.items())[:1]}
     q, samples = walk(700, n, seed), slice(3, 690)
-    states, entries = FilteredStates(q, RATE, Signals(median=1), room), Entries(model, names)
+    states, entries = FilteredStates(q, RATE, Signals(median=1), room), SignalEntries(model, names)
     expected = filtered_states(q, RATE, Signals(median=1))[samples]
     D = model.module.regressor(expected.q, expected.qd, expected.qdd, **changed).transpose(2, 1, 0)
     D = np.ascontiguousarray(D[[model.BASE_PARAMETERS.index(name) for name in names]])
@@ -148,10 +148,10 @@ def test_random_robots_entry_by_entry(seed, tmp_path):
         assert np.all(np.abs(store(entries, y) - right) <= 1e-12 * largest)
 
 
-def system(planar: CompiledModel, K: int, seed: int) -> tuple[Entries, Array, Array, Array, Array]:
-    """Entries, made-up signals, torques and mask; W in the rows that the mask keeps."""
+def system(planar: CompiledModel, K: int, seed: int) -> tuple[SignalEntries, Array, Array, Array, Array]:
+    """SignalEntries, made-up signals, torques and mask; W in the rows that the mask keeps."""
     rng = np.random.default_rng(seed)
-    entries = Entries(planar, planar.BASE_PARAMETERS)
+    entries = SignalEntries(planar, planar.BASE_PARAMETERS)
     y, Y, mask = rng.standard_normal((len(entries.wanted), K)), rng.standard_normal((2, K)), rng.random((2, K)) < 0.8
     D = store(entries, y)
     return entries, y, Y, mask, np.vstack([D[:, j, mask[j]].T for j in range(2)])
@@ -199,7 +199,7 @@ def test_the_condition_decides_which_way_is_taken(planar):
 def test_refusals(planar):
     room, q = Room(), walk(20, 2)
     with pytest.raises(InputError, match="20 samples"):
-        decimated(Entries(planar, planar.BASE_PARAMETERS), FilteredStates(q, RATE, PLAIN, room), slice(0, 20), 2, Decimate(factor=2),
+        decimated(SignalEntries(planar, planar.BASE_PARAMETERS), FilteredStates(q, RATE, PLAIN, room), slice(0, 20), 2, Decimate(factor=2),
                   constant_values(planar, {}), room)  # fmt: skip
     with pytest.raises(InputError, match="12 samples"):
         FilteredStates(q[:12], RATE, Signals(median=1), room)
@@ -208,7 +208,7 @@ def test_refusals(planar):
     with pytest.raises(InputError, match="refused arguments"):
         FilteredStates(q, RATE, PLAIN, room).rows(slice(5, 30))
     with pytest.raises(InputError, match="no column nothing"):
-        Entries(planar, ("nothing",))
+        SignalEntries(planar, ("nothing",))
     with pytest.raises(InputError, match="no constants nothing"):
         constant_values(planar, {"nothing": 1.0})
 

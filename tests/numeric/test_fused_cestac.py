@@ -49,7 +49,7 @@ def record_of(model: CompiledModel, N: int, seed: int, rate: float = 1000.0) -> 
     angle = t[:, None, None] * w + p
     q, qd, qdd = (a * np.sin(angle)).sum(1), (a * w * np.cos(angle)).sum(1), -(a * w**2 * np.sin(angle)).sum(1)
     tau = model.module.regressor(q, qd, qdd) @ rng.uniform(0.2, 2.0, len(model.BASE_PARAMETERS)) + 0.05 * rng.standard_normal((N, n))
-    return Record(t, q, tau, rate, name="simulated", files={"simulated.csv": "ab" * 32})
+    return Record(t, q, tau, rate=rate, name="simulated", files={"simulated.csv": "ab" * 32})
 
 
 def study(signals: Signals | None = None, rows: Rows | None = None, **settings: object) -> Study:

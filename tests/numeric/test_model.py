@@ -10,8 +10,10 @@ import pytest
 
 from runtime import load_model
 from runtime.errors import ModelError
-from runtime.model.generated import check_states, require
+from runtime.model.generated import check_states, joint_units, require
 from runtime.model.loading import check_source
+from symgen.description import load_robot
+from symgen.emit.generate import generate_module
 
 HERE = Path(__file__).parent
 EMITTED = HERE.parents[1] / "generated"
@@ -148,3 +150,15 @@ def test_a_file_that_fails_says_so(tmp_path):
     (tmp_path / "a.py").write_text(HEAD + "x = [][1]\n", encoding="utf-8")
     with pytest.raises(ModelError, match="fails on import with IndexError"):
         load_model(tmp_path / "a.py")
+
+
+@pytest.mark.parametrize(
+    ("robot", "units"), [("scara", "rad rad rad m"), ("stanford", "rad rad m rad rad rad"), ("emps", "m"), ("sr400", "rad " * 6)]
+)
+def test_units_of_the_joints(tmp_path, robot, units):
+    """From friction and inertia along each joint; without such elements from what acts on it."""
+    (tmp_path / f"{robot}.py").write_text(generate_module(load_robot(robot)), encoding="utf-8")
+    model = load_model(tmp_path / f"{robot}.py")
+    assert joint_units(model) == tuple(units.split())
+    model.ELEMENTS = {}
+    assert joint_units(model) == tuple(units.split())

@@ -12,12 +12,16 @@ import pytest
 import scipy.signal
 from planar_data import TRUE, motion
 
-from runtime import Record, load_model, observe
+from runtime import Record, essential, estimate, load_model, observe
 from runtime.errors import InputError
+from runtime.identification.uncertainty import block_bootstrap
+from runtime.identification.validation import weak_directions
 from runtime.observation.filters import States, decimated, filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states, select_rows, stack
+from runtime.observation.qr_factor import factor
 from runtime.observation.regressor_signals import decimated_columns, distinct_entries, signals_of
-from runtime.settings.study import Decimate, study_from_mapping
+from runtime.records.stream import RecordStream
+from runtime.settings.study import Decimate, EstimateSettings, study_from_mapping
 
 RATE, N = 1000.0, 6000
 T = np.arange(N) / RATE
@@ -30,7 +34,7 @@ def study(**sections):
 @pytest.fixture(scope="module")
 def record():
     q, qd, qdd = motion(T)
-    return Record(T, q, planar.regressor(q, qd, qdd) @ TRUE, RATE, "arm", {"arm.csv": "ab" * 32})
+    return Record(T, q, planar.regressor(q, qd, qdd) @ TRUE, rate=RATE, name="arm", files={"arm.csv": "ab" * 32})
 
 
 def test_noise_free_data_return_the_parameters(record):
@@ -218,6 +222,31 @@ def test_columns_and_windows(record):
         o.columns(["FV9"])
     with pytest.raises(InputError, match=r"no row in \[100, 200\] s"):
         o.between(100, 200)
+
+
+def test_records_and_streams_in_one_list_are_all_read(record):
+    s = study(rows={"low_speed": 0.2})
+    both, alone = observe(planar, [record, RecordStream(record, 500)], s), observe(planar, record, s)
+    assert both.rows == tuple(2 * k for k in alone.rows) and set(both.record) == {0, 1} and both.reduced is None
+    for k in range(2):
+        np.testing.assert_allclose(both.of_record(k).W, alone.W, rtol=0, atol=1e-10 * np.abs(alone.W).max())
+    assert np.array_equal(observe(planar, [record, record], s).W, stack([alone, alone]).W)
+    with pytest.raises(InputError, match="no record"):
+        observe(planar, [], s)
+    with pytest.raises(InputError, match="one record in memory"):
+        observe(planar, [record, record], s, keep=np.ones(N, dtype=bool))
+
+
+def test_rows_are_factored_once(record, monkeypatch):
+    """Estimates, essential parameters and deviations read one factor."""
+    calls = []
+    monkeypatch.setattr("runtime.observation.system.factor", lambda *given: calls.append(1) or factor(*given))
+    o = observe(planar, record, study())
+    fits = estimate(planar, o), essential(planar, o)
+    weak_directions(o)
+    block_bootstrap(o, EstimateSettings(), fits[1].estimate)
+    assert len(calls) == 1 and fits[1].all_parameters.names == fits[0].names
+    assert np.array_equal(fits[1].all_parameters.X, fits[0].X) and np.array_equal(estimate(planar, record, study()).X, fits[0].X)
 
 
 def test_stack_is_joint_major(record):

@@ -2,6 +2,7 @@
 
 import gzip
 import hashlib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,12 @@ N, RATE = 60, 200.0
 T = np.arange(N) / RATE
 Q = np.stack([np.sin(T), np.cos(3 * T)], axis=1)
 TAU = np.stack([T, T**2], axis=1)
+
+
+def robot(drives):
+    """A model with these drives."""
+    given = {"ratio": drives.ratio, "offset": drives.offset, "torque_constant": drives.torque_constant}
+    return SimpleNamespace(NAME="arm", JOINTS=tuple(range(drives.n)), DRIVES=given)
 
 
 def settings(**record):
@@ -48,12 +55,12 @@ def cells():
 
 def test_record_is_a_read_only_copy():
     q = Q.copy()
-    record = Record(T, q, TAU, RATE)
+    record = Record(T, q, TAU, rate=RATE)
     q[0, 0] = 9
     assert record.q[0, 0] == 0 and record.n == 2 and len(record) == N
     with pytest.raises(ValueError, match="read-only"):
         record.q[0, 0] = 1
-    assert Record(T, Q[:, 0], TAU[:, 0], RATE).q.shape == (N, 1)
+    assert Record(T, Q[:, 0], TAU[:, 0], rate=RATE).q.shape == (N, 1)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +76,7 @@ def test_record_is_a_read_only_copy():
 )
 def test_record_refuses(t, q, tau, rate, said):
     with pytest.raises(InputError) as e:
-        Record(t, q, tau, rate)
+        Record(t, q, tau, rate=rate)
     assert said in str(e.value)
 
 
@@ -163,7 +170,7 @@ def test_torque_constants(tmp_path):
     drives = Drives(np.array([[10.0, 0], [5, 20]]), 0.0, [0.1, 0.2])
 
     def tau(**record):
-        return read_record(settings(files="a.csv", **record), drives, folder=tmp_path).tau
+        return read_record(settings(files="a.csv", **record), robot(drives), folder=tmp_path).tau
 
     np.testing.assert_allclose(tau(side="motor"), TAU @ drives.ratio)
     np.testing.assert_allclose(tau(side="motor", units={"tau": "A"}), (TAU * [0.1, 0.2]) @ drives.ratio)
@@ -182,7 +189,7 @@ def test_joint_angles_beside_motor_currents(tmp_path):
     write_csv(tmp_path / "motor.csv", rows=np.column_stack([T, motor, TAU]))
 
     def read(name, **record):
-        return read_record(settings(files=name, **record), drives, folder=tmp_path)
+        return read_record(settings(files=name, **record), robot(drives), folder=tmp_path)
 
     one = read("motor.csv", side="motor", units={"tau": "mA"})
     mixed = read("joint.csv", side="joint", torque_side="motor", units={"tau": "mA"})
@@ -254,7 +261,7 @@ NAMES = "t;q1;q2;tau1;tau2\n"
             "line 2: 7 fields; expected 5 (t, q1, q2, tau1, tau2); if decimals are written with commas, separate columns by semicolons "
             "and set record.decimal: ','",
         ),
-        (NAMES + "ms;deg;deg;mA;mA\n0;0;0;0;0\n", "line 2: 'deg'; expected a number; put # before a second line of names or units"),
+        (NAMES + "ms;deg;deg;mA;mA\n0;0;0;0;0\n", "line 2: 'ms'; expected a number; put # before a second line of names or units"),
         (
             "Log of cell\n" + NAMES + "0;0;0;0;0\n",
             "line 2: 1 fields; expected 3 (Log, of, cell); put # before lines that are neither names nor numbers",
@@ -278,8 +285,10 @@ def test_a_log_of_another_encoding_says_how_to_save_it(tmp_path):
 def test_motor_side_needs_drives(tmp_path):
     write_csv(tmp_path / "a.csv")
     drives = Drives(np.diag([2.0, -4.0]), [0.1, 0.2], 1.0)
-    np.testing.assert_allclose(read_record(settings(files="a.csv", side="motor"), drives, folder=tmp_path).q, Q / [2, -4] + [0.1, 0.2])
-    np.testing.assert_array_equal(read_record(settings(files="a.csv", side="joint"), drives, folder=tmp_path).q, Q)
+    np.testing.assert_allclose(
+        read_record(settings(files="a.csv", side="motor"), robot(drives), folder=tmp_path).q, Q / [2, -4] + [0.1, 0.2]
+    )
+    np.testing.assert_array_equal(read_record(settings(files="a.csv", side="joint"), robot(drives), folder=tmp_path).q, Q)
     with pytest.raises(InputError, match="has no drives"):
         read_record(settings(files="a.csv", side="motor"), folder=tmp_path)
 
@@ -357,7 +366,7 @@ def test_no_time_and_no_rate(tmp_path):
 def test_wrong_number_of_joints(tmp_path):
     write_csv(tmp_path / "a.csv")
     with pytest.raises(InputError, match="the robot has 3 joints"):
-        read_record(settings(files="a.csv"), Drives(np.eye(3), 0.0, 1.0), folder=tmp_path)
+        read_record(settings(files="a.csv"), robot(Drives(np.eye(3), 0.0, 1.0)), folder=tmp_path)
 
 
 def test_different_lengths(tmp_path):

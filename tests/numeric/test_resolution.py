@@ -16,10 +16,13 @@ from runtime.observation.position_errors import encoder_root, perturbation
 from runtime.observation.sign_errors import Switch, kernels, switched, switches
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
+from runtime.records.record import Record
 from runtime.reporting.resolution_advice import advice_section
 from runtime.resolution.advice import AGREED, crossing, sampled
 from runtime.resolution.advisor import ALL, Predictor, advise, torque_sigma
 from runtime.settings.study import Decimate, Lowpass, Signals, study_from_mapping
+from symgen.description import load_robot
+from symgen.emit.generate import generate_files
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 TX40_COLUMNS = (
@@ -184,6 +187,7 @@ def test_torque_noise_adds_to_sigma_and_does_not_bias(emps, emps_advice):
     assert np.all(np.abs(X.mean(axis=1)) < 4 * found / np.sqrt(300))
 
 
+@pytest.mark.campaign
 def test_tx40_steps_predicted_and_sampled(tx40_data):
     """All encoders and two single ones; every parameter that matters, not only the first."""
     model, study, record = opened("tx40")
@@ -244,3 +248,31 @@ def test_weights_low_speed_and_several_records(emps):
     weighted = advise(model, record, replace(fast, estimate=replace(fast.estimate, method="wls")), columns=columns, confirm=False)
     for other in (both, weighted):
         assert np.allclose(other.encoders[0].change, first.change, rtol=1e-6, atol=1e-9)
+
+
+def test_units_are_those_of_each_encoder(tmp_path):
+    """Three joints of a SCARA turn and one slides: every step was printed in metres."""
+    for name, text in generate_files(load_robot("scara")).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    model = load_model(tmp_path / "scara.py")
+    rng, t = np.random.default_rng(0), np.arange(3000) / 1000
+    a, w, p = rng.uniform(0.1, 0.4, (4, 4)), rng.uniform(2.0, 9.0, (4, 4)), rng.uniform(0, 6, (4, 4))
+    angle = t[:, None, None] * w + p
+    q, qd, qdd = (a * np.sin(angle)).sum(1), (a * w * np.cos(angle)).sum(1), -(a * w**2 * np.sin(angle)).sum(1)
+    tau = model.regressor(q, qd, qdd) @ rng.uniform(0.5, 2.0, len(model.BASE_PARAMETERS)) + 0.01 * rng.standard_normal((3000, 4))
+    study = study_from_mapping(
+        {"signals": {"median": 1, "lowpass": {"cutoff": 20}, "decimate": {"factor": 10}}, "cestac": {"columns": "all"}}
+    )
+    advice = advise(model, Record(t, q, tau, rate=1000.0), study, confirm=False)
+    assert [encoder.unit for encoder in advice.encoders] == ["rad or m", "rad", "rad", "rad", "m"]
+    lines = advice.to_table().splitlines()
+    assert "Delta, rad or m" in lines[0]
+    for line, (label, turn) in zip(
+        lines[1:6], [("all", False), ("1, rad", True), ("2, rad", True), ("3, rad", True), ("4, m", False)], strict=True
+    ):
+        assert line.startswith(label) and ("2*pi/" in line) == turn, line
+    assert (
+        "Of single encoders in rad, that of joint" in advice.verdict
+        and "Of single encoders in m, that of joint 4 asks most" in advice.verdict
+    )
+    assert [encoder["unit"] for encoder in json.loads(advice.to_json())["encoders"]][-1] == "m"

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.observation.filters import States
 from runtime.observation.observation import decimated_torque, observation_from_states
@@ -52,13 +52,13 @@ def truth(tx40):
 def clean(tx40, states, truth):
     """Torques (N, 6), rows and the noise-free observation."""
     tau = tx40.inverse_dynamics(states.q, states.qd, states.qdd, truth)
-    record = Record(np.arange(N) / RATE, states.q, tau, RATE)
+    record = Record(np.arange(N) / RATE, states.q, tau, rate=RATE)
     selection = select_rows(record, states.qd, STUDY.signals, STUDY.rows)
     return tau, selection, observation_from_states(tx40, states, decimated_torque(tau, selection), selection)
 
 
 def test_noise_free_records_give_the_parameters_back(clean, truth) -> None:
-    found = estimate(clean[2], EstimateSettings())
+    found = estimate_of(clean[2], EstimateSettings())
     assert found.status == "ok" and found.rank == 60
     assert np.abs(found.X - truth).max() <= 1e-9 * np.abs(truth).max()
 
@@ -76,7 +76,7 @@ def test_stated_sigma_is_the_scatter_over_200_records(clean, truth, method: str)
     for seed in range(RUNS):
         noise = NOISE * np.random.default_rng(1000 + seed).standard_normal(tau.shape)
         Y = decimated_torque(tau + noise, selection).reshape(-1)
-        found = estimate(replace(seen, Y=Y), settings)
+        found = estimate_of(replace(seen, Y=Y), settings)
         plain.append((found.X - truth) / found.sigma)
         corrected.append((found.X - truth) / found.sigma_corrected)
     z = np.sqrt(np.mean(np.square(corrected), axis=0))

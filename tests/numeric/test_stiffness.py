@@ -10,7 +10,7 @@ import pytest
 
 from oracles.pinocchio_model import PinocchioModel
 from runtime import Record, observe
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
@@ -56,7 +56,7 @@ def test_stiffness_is_identified(robot, tmp_path, noise: float) -> None:
     tau = np.array([oracle.torque(*state, chi) for state in zip(q, qd, qdd, strict=True)])
     tau += noise * np.random.default_rng(0).standard_normal(tau.shape)
     study = study_from_mapping({"signals": {"median": 1, "lowpass": None, "decimate": {"factor": 4}}})
-    found = estimate(observe(model, Record(t, q, tau, RATE), study), model=model)
+    found = estimate_of(observe(model, Record(t, q, tau, rate=RATE), study), model=model)
     assert found.status == "ok"
     exact = 2e-3  # of central differences and the decimation filter
     for name in ("K1", "K2", "OFFSET1", "OFFSET2"):

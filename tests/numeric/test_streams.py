@@ -5,6 +5,7 @@ import sys
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import planar_2r_model as planar
@@ -12,12 +13,11 @@ import pytest
 
 from runtime import load_model, observe, read_record
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import estimate
-from runtime.estimators.essential import essential
+from runtime.estimators.essential import essential_of
+from runtime.estimators.methods import estimate_of, observed
 from runtime.identification.validation import cross_validation, split_validation, weak_directions
 from runtime.model.drives import Drives
-from runtime.observation.by_blocks import halves, reduce_records
-from runtime.observation.observation import stack
+from runtime.observation.system import halves, stack
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import are_large, open_stream
@@ -66,6 +66,12 @@ def write(kind, folder, samples):
     return {"files": [path.name], "columns": columns}
 
 
+def robot(drives):
+    """A model with these drives."""
+    given = {"ratio": drives.ratio, "offset": drives.offset, "torque_constant": drives.torque_constant}
+    return SimpleNamespace(NAME="arm", JOINTS=tuple(range(drives.n)), DRIVES=given)
+
+
 def settings(given, **others):
     return study_from_mapping({"record": {**given, **others}}).record[0]
 
@@ -74,8 +80,8 @@ def settings(given, **others):
 @pytest.mark.parametrize("kind", ["csv", "csv gz", "npz", "npz compressed", "npz matrices", "npy", "parquet"])
 def test_formats_by_blocks(tmp_path, samples, kind, block):
     given = settings(write(kind, tmp_path, samples), side="motor", units={"tau": "A"})
-    whole = read_record(given, DRIVES, folder=tmp_path)
-    stream = open_stream(given, DRIVES, folder=tmp_path, block=block)
+    whole = read_record(given, robot(DRIVES), folder=tmp_path)
+    stream = open_stream(given, robot(DRIVES), folder=tmp_path, block=block)
     assert (len(stream), stream.rate, stream.n, dict(stream.files), stream.name) == (N, whole.rate, 2, dict(whole.files), "record")
     parts = list(stream.blocks())
     assert [len(t) for t, _, _ in parts] == [min(block, N - a) for a in range(0, N, block)]
@@ -139,7 +145,7 @@ def test_bad_files(tmp_path, samples):
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 255
     path.write_bytes(data)
-    with pytest.raises(InputError, match="damaged file of arrays"):
+    with pytest.raises(InputError, match="damaged, or not an archive of plain arrays"):
         list(open_stream(given, folder=tmp_path, block=100).blocks())
     path.write_bytes(data[:1000])
     with pytest.raises(InputError, match="not an archive of plain arrays"):
@@ -148,7 +154,7 @@ def test_bad_files(tmp_path, samples):
     with pytest.raises(InputError, match="columns of different lengths: q1 1003, q2 1002"):
         open_stream(replace(given, rate=RATE), folder=tmp_path)
     np.savez(path, q1=np.array([{}], dtype=object))
-    with pytest.raises(InputError, match="no columns q1"):
+    with pytest.raises(InputError, match=r"not an archive of plain arrays \(q1 holds pickled objects"):
         open_stream(replace(given, rate=RATE), folder=tmp_path)
     with pytest.raises(InputError, match="no such file"):
         open_stream(RecordSettings(files=("nothing.csv",)), folder=tmp_path)
@@ -187,6 +193,13 @@ def tx40(tx40_data):
     return model, study, read_records(study.record, model)[0]
 
 
+def by_blocks(model, streams, study, held=0):
+    """Observation of streams whose W may take `held` bytes; 0: reduced to triangular factors."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("runtime.observation.observation.HELD", held)
+        return observed(model, streams, study)
+
+
 def same(found, expected):
     """1e-10 of the largest, the goal; deviations and norms to 1e-9 of themselves."""
     assert found.names == expected.names and found.rank == expected.rank
@@ -204,9 +217,9 @@ def same(found, expected):
 def test_identification_of_the_tx40_by_blocks(tx40, block):
     model, study, record = tx40
     whole = observe(model, record, study)
-    reduction = reduce_records(model, [RecordStream(record, block)], study)
+    reduction = by_blocks(model, [RecordStream(record, block)], study)
     assert (reduction.rows, reduction.dropped, reduction.files) == (whole.rows, whole.dropped, whole.files)
-    expected, found = (essential(x, study.essential, study.estimate, model=model) for x in (whole, reduction))
+    expected, found = (essential_of(x, study.essential, study.estimate, model=model) for x in (whole, reduction))
     same(found.all_parameters, expected.all_parameters)
     same(found.estimate, expected.estimate)
     assert [step.name for step in found.trail] == [step.name for step in expected.trail] and found.counts == expected.counts
@@ -215,7 +228,11 @@ def test_identification_of_the_tx40_by_blocks(tx40, block):
         assert (one.part, one.columns, one.fitted) == (other.part, other.columns, other.fitted)
         np.testing.assert_allclose((one.relative_error, *one.per_joint), (other.relative_error, *other.per_joint), rtol=1e-8)
     assert weak_directions(reduction, study.estimate).groups == weak_directions(whole, study.estimate).groups
-    np.testing.assert_allclose(reduction.shown.W, whole.W, atol=1e-10 * np.abs(whole.W).max())
+    np.testing.assert_allclose(reduction.first_rows.W, whole.W, atol=1e-10 * np.abs(whole.W).max())
+    held = by_blocks(model, [RecordStream(record, block)], study, held=whole.W.nbytes)
+    assert held.reduced is None and held.rows == whole.rows and np.array_equal(held.record, whole.record)
+    for name in ("W", "Y", "t"):
+        np.testing.assert_allclose(getattr(held, name), getattr(whole, name), rtol=0, atol=1e-10 * np.abs(getattr(whole, name)).max())
 
 
 @pytest.mark.parametrize(
@@ -234,9 +251,9 @@ def test_identification_of_the_tx40_by_blocks(tx40, block):
 def test_settings_by_blocks(tx40, changed, estimator):
     model, study, record = tx40
     study = study_from_mapping({"estimate": estimator, **changed})
-    whole, reduction = observe(model, record, study), reduce_records(model, [RecordStream(record, 4001)], study)
+    whole, reduction = observe(model, record, study), by_blocks(model, [RecordStream(record, 4001)], study)
     assert (reduction.rows, reduction.dropped) == (whole.rows, whole.dropped)
-    same(*(estimate(x, study.estimate, model=model) for x in (reduction, whole)))
+    same(*(estimate_of(x, study.estimate, model=model) for x in (reduction, whole)))
 
 
 def test_several_records_by_blocks(tx40):
@@ -244,13 +261,13 @@ def test_several_records_by_blocks(tx40):
     study = replace(study, rows=replace(study.rows, window=(None, None), low_speed=0.05))
     parts = [replace(record, t=record.t[s], q=record.q[s], tau=record.tau[s]) for s in (slice(0, 21000), slice(15000, 40000))]
     whole = stack([observe(model, part, study) for part in parts])
-    reduction = reduce_records(model, [RecordStream(part, 6000) for part in parts], study)
+    reduction = by_blocks(model, [RecordStream(part, 6000) for part in parts], study)
     assert (reduction.rows, reduction.dropped, reduction.files) == (whole.rows, whole.dropped, whole.files)
-    same(*(estimate(x, study.estimate, model=model) for x in (reduction, whole)))
-    assert reduction.windows == halves(float(whole.t.min()), float(whole.t.max())) or study.validate.split
+    same(*(estimate_of(x, study.estimate, model=model) for x in (reduction, whole)))
+    assert reduction.reduced.windows == halves(float(whole.t.min()), float(whole.t.max())) or study.validate.split
     one, other = (
         cross_validation(x, {"first": y}, study.estimate).predictions[1]
-        for x, y in ((whole, observe(model, parts[0], study)), (reduction, reduce_records(model, [RecordStream(parts[0], 3000)], study)))
+        for x, y in ((whole, observe(model, parts[0], study)), (reduction, by_blocks(model, [RecordStream(parts[0], 3000)], study)))
     )
     np.testing.assert_allclose((one.relative_error, *one.per_joint), (other.relative_error, *other.per_joint), rtol=1e-8)
 
@@ -258,20 +275,20 @@ def test_several_records_by_blocks(tx40):
 def test_what_needs_the_rows_is_refused(tx40):
     model, study, record = tx40
     short = replace(study, rows=replace(study.rows, window=(1.0, 2.0)), validate=replace(study.validate, split=((1.0, 1.5), (1.5, 2.0))))
-    reduction = reduce_records(model, [RecordStream(record, 5000)], short)
+    reduction = by_blocks(model, [RecordStream(record, 5000)], short)
     with pytest.raises(SettingsError, match="stream: off"):
-        estimate(reduction, EstimateSettings("wls", "covariance"))
+        estimate_of(reduction, EstimateSettings("wls", "covariance"))
     for refused in (EstimateSettings("wls", "covariance"), EstimateSettings("feasible")):
         with pytest.raises(SettingsError, match="read by blocks"):
-            reduce_records(model, [RecordStream(record, 5000)], replace(short, estimate=refused))
+            by_blocks(model, [RecordStream(record, 5000)], replace(short, estimate=refused))
     with pytest.raises(InputError, match="cut by the windows"):
         reduction.between(1.0, 1.7)
     with pytest.raises(InputError, match=r"no sample in rows\.window"):
-        reduce_records(model, [RecordStream(record, 5000)], replace(study, rows=replace(study.rows, window=(20.0, 30.0))))
+        by_blocks(model, [RecordStream(record, 5000)], replace(study, rows=replace(study.rows, window=(20.0, 30.0))))
     with pytest.raises(InputError, match=r"of which rows\.trim leaves out 200"):
-        reduce_records(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, trim=100)))
+        by_blocks(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, trim=100)))
     with pytest.raises(InputError, match="no row is left"):
-        reduce_records(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, low_speed=100.0)))
+        by_blocks(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, low_speed=100.0)))
 
 
 class Endless:
@@ -300,7 +317,7 @@ def test_memory_does_not_grow_with_the_record():
     peaks = []
     for samples in (60_000, 240_000):
         tracemalloc.start()
-        reduction = reduce_records(planar, [Endless(samples)], study)
+        reduction = by_blocks(planar, [Endless(samples)], study)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert reduction.rows[0] > 0.8 * samples / 20

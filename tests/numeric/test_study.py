@@ -1,6 +1,8 @@
 """Settings: defaults of the chapter, round trip, arithmetic, and errors that say which key."""
 
 import math
+import pickle
+from dataclasses import FrozenInstanceError, replace
 
 import pytest
 
@@ -9,7 +11,7 @@ from runtime.records.datasets import DATASETS, dataset_study
 from runtime.records.named import study_of
 from runtime.settings.arithmetic import number
 from runtime.settings.files import load_study, study_from_text
-from runtime.settings.study import Study, study_from_mapping, to_mapping
+from runtime.settings.study import Lowpass, Rows, Signals, Study, study_from_mapping, to_mapping
 
 DESIGN = """
 symgen: 1
@@ -189,6 +191,42 @@ def test_arithmetic(text, value):
 def test_arithmetic_refuses(text):
     with pytest.raises(ValueError, match=r"number|value|allowed"):
         number(text)
+
+
+def test_words_that_run_into_numbers_warn_nobody(recwarn):
+    for text in ("1if 1else 2", "0xfor x", "30rpm"):
+        with pytest.raises(ValueError, match=r"number|allowed"):
+            number(text)
+    assert not recwarn.list
+
+
+def test_a_file_is_a_text_or_a_path(tmp_path):
+    """load_study("s.yaml") failed on texts."""
+    path = tmp_path / "arm.yaml"
+    path.write_text(DESIGN, encoding="utf-8")
+    assert load_study(str(path)) == load_study(path)
+    assert study_of(path) == study_of(str(path))
+
+
+def test_settings_made_in_python_are_checked():
+    for make, said in (
+        (lambda: Lowpass(cutoff=-1), "cutoff: -1; expected more than 0"),
+        (lambda: Lowpass(50, 4, ("q", "qdd")), r"on[1]: 'qdd'; expected q or qd"),
+        (lambda: Lowpass(frequency=50), "unknown key frequency; known: cutoff, order, on, padding"),
+        (lambda: Signals(lowpass=3), "lowpass: 3; expected a mapping with some of cutoff"),
+        (lambda: replace(Study(), stream=3), "stream: 3; expected auto or off or at least 10"),
+    ):
+        with pytest.raises(SettingsError) as e:
+            make()
+        assert said in str(e.value)
+
+
+def test_settings_are_values():
+    study = study_from_text(DESIGN)
+    assert hash(study.rows) == hash(study_from_text(DESIGN).rows) and study == pickle.loads(pickle.dumps(study))  # noqa: S301
+    assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(window=(0, 7.5), trim=0)
+    with pytest.raises(FrozenInstanceError):
+        study.rows = Rows()
 
 
 def test_blocks_of_the_records():

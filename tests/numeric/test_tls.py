@@ -9,8 +9,8 @@ from planar_data import OLS, TRUE, WLS, observation
 from scipy.optimize import minimize
 
 from runtime.errors import SettingsError
-from runtime.estimators import estimate
-from runtime.identification.identification import identification
+from runtime.estimators.methods import estimate_of
+from runtime.identification.identification import identify
 from runtime.model.generated import load_model
 from runtime.observation.observation import observe, stack
 from runtime.observation.position_errors import with_errors
@@ -36,7 +36,7 @@ def axis(seed, error, noise=2.0, N=8000):
     D = EMPS.regressor(q[:, None], qd[:, None], qdd[:, None])[:, 0]
     rng = np.random.default_rng(seed)
     tau = D @ X_EMPS + noise * rng.standard_normal(N)
-    return Record(t, q + error * rng.standard_normal(N), tau, 1000.0, name="axis", files={"axis": "0" * 64})
+    return Record(t, q + error * rng.standard_normal(N), tau, rate=1000.0, name="axis", files={"axis": "0" * 64})
 
 
 def rows(seed, error, assumed=None):
@@ -62,23 +62,25 @@ C3 = np.array([[0.9, 0.2, -0.1], [0.2, 0.5, 0.05], [-0.1, 0.05, 0.2]])
 def test_no_noisy_column_is_least_squares():
     seen, _ = disturbed(C3)
     for weights, plain in (("none", OLS), ("joint", WLS), ("iterated", EstimateSettings("wls", "iterated"))):
-        found = estimate(seen, tls(weights, position_error=0.0))
-        assert np.array_equal(found.X, estimate(seen, plain).X) and found.details["noisy"] == []
+        found = estimate_of(seen, tls(weights, position_error=0.0))
+        assert np.array_equal(found.X, estimate_of(seen, plain).X) and found.details["noisy"] == []
     exact = replace(seen, errors=np.zeros_like(seen.errors))
-    assert np.array_equal(estimate(exact, tls(position_error=1.0)).X, estimate(seen, OLS).X)
+    assert np.array_equal(estimate_of(exact, tls(position_error=1.0)).X, estimate_of(seen, OLS).X)
 
 
 def test_small_errors_come_near_to_least_squares():
     seen, _ = disturbed(1e-12 * C3)
-    assert np.allclose(estimate(seen, tls(position_error=1.0)).X, estimate(seen, OLS).X, rtol=1e-6)
-    assert np.allclose(estimate(seen, tls("joint", position_error=1.0)).X, estimate(seen, WLS).X, rtol=0.02)  # t_j and s_j differ a little
+    assert np.allclose(estimate_of(seen, tls(position_error=1.0)).X, estimate_of(seen, OLS).X, rtol=1e-6)
+    assert np.allclose(
+        estimate_of(seen, tls("joint", position_error=1.0)).X, estimate_of(seen, WLS).X, rtol=0.02
+    )  # t_j and s_j differ a little
 
 
 def test_exact_data_give_the_parameters_whatever_errors_are_assumed():
     seen = observation()
     errors = np.zeros((2, len(TRUE), len(TRUE)))
     errors[:, :3, :3] = 1e-4 * C3
-    found = estimate(replace(seen, errors=errors), tls(position_error=1.0, torque_error=0.1))
+    found = estimate_of(replace(seen, errors=errors), tls(position_error=1.0, torque_error=0.1))
     assert np.allclose(found.X, TRUE, rtol=1e-8) and found.details["noisy"] == list(seen.names[:3])
 
 
@@ -86,7 +88,7 @@ def test_minimum_of_the_rayleigh_quotient():
     """sum_j |Y_j - W_j X|^2 / t_j^2 / (1 + X_2' C X_2): what total least squares with known errors minimises, minimised by scipy."""
     seen, columns = disturbed(0.01 * C3)
     t = np.array([0.4, 0.2])
-    found = estimate(seen, tls("joint", position_error=1.0, torque_error=tuple(t)))
+    found = estimate_of(seen, tls("joint", position_error=1.0, torque_error=tuple(t)))
     row = np.repeat(t, seen.rows)
     C = 0.01 * C3 * np.mean(t**-2.0)
     scale = np.abs(TRUE) + 0.1
@@ -95,7 +97,7 @@ def test_minimum_of_the_rayleigh_quotient():
         X = z * scale
         return np.sum(((seen.Y - seen.W @ X) / row) ** 2) / (1 + X[columns] @ C @ X[columns]) / len(row)
 
-    start = minimize(cost, estimate(seen, WLS).X / scale, method="BFGS", options={"gtol": 1e-10})
+    start = minimize(cost, estimate_of(seen, WLS).X / scale, method="BFGS", options={"gtol": 1e-10})
     best = minimize(cost, start.x, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-15, "maxiter": 20000, "adaptive": True})
     assert cost(found.X / scale) <= best.fun * (1 + 1e-9)
     assert np.allclose(found.X, best.x * scale, rtol=1e-3, atol=1e-4)
@@ -105,8 +107,8 @@ def test_errors_in_columns_bias_least_squares_and_not_tls():
     ordinary, corrected, sigma = [], [], []
     for seed in range(60):
         seen, _ = disturbed(C3, seed=seed, N=500)
-        ordinary.append(estimate(seen, OLS).X)
-        found = estimate(seen, tls(position_error=1.0, bootstrap=30))
+        ordinary.append(estimate_of(seen, OLS).X)
+        found = estimate_of(seen, tls(position_error=1.0, bootstrap=30))
         corrected.append(found.X)
         sigma.append(found.sigma)
     biased, right = np.mean(ordinary, axis=0) - TRUE, np.mean(corrected, axis=0) - TRUE
@@ -122,31 +124,31 @@ def test_simulated_encoder(error):
     ordinary, corrected = [], []
     for seed in range(12):
         seen = rows(seed, error)
-        ordinary.append(estimate(seen, OLS)["M1R"])
-        corrected.append(estimate(seen, tls(position_error=error), model=EMPS)["M1R"])
+        ordinary.append(estimate_of(seen, OLS)["M1R"])
+        corrected.append(estimate_of(seen, tls(position_error=error), model=EMPS)["M1R"])
     lost, left = np.mean(ordinary) - X_EMPS[0], np.mean(corrected) - X_EMPS[0]
     assert lost < -0.04 * X_EMPS[0]
     assert abs(left) < 0.1 * abs(lost)
 
 
 def test_torque_noise_is_what_the_positions_leave():
-    found = estimate(rows(0, 2e-7), tls(position_error=2e-7))
+    found = estimate_of(rows(0, 2e-7), tls(position_error=2e-7))
     assert found.details["exact"] == ["FS1", "OFFSET1"] and found.details["noisy"] == ["M1R", "FV1"]
-    assert found.details["torque_error"][0] == pytest.approx(estimate(rows(0, 0.0), OLS).sigma_rho, rel=0.05)
+    assert found.details["torque_error"][0] == pytest.approx(estimate_of(rows(0, 0.0), OLS).sigma_rho, rel=0.05)
 
 
 def test_errors_assumed_that_hide_the_parameters_are_declined():
     seen = rows(0, 2e-3)
-    found = estimate(seen, tls(position_error=2e-3))
+    found = estimate_of(seen, tls(position_error=2e-3))
     assert found.status == "ill-posed" and "no usable solution" in found.message
-    assert np.array_equal(found.X, estimate(seen, OLS).X)
+    assert np.array_equal(found.X, estimate_of(seen, OLS).X)
 
 
 def test_whole_identification(tmp_path):
     """errors travel through stacking, essential columns and windows."""
     study = replace(STUDY, estimate=tls(position_error=1e-5))
-    found = identification(EMPS, study, [axis(1, 1e-5), axis(2, 1e-5)], provenance={"simulated": True})
-    assert found.chosen.method == "tls" and found.chosen["M1R"] == pytest.approx(95, rel=0.02)
+    found = identify(EMPS, [axis(1, 1e-5), axis(2, 1e-5)], study, provenance={"simulated": True})
+    assert found.estimate.method == "tls" and found.estimate["M1R"] == pytest.approx(95, rel=0.02)
     one, other = rows(1, 1e-5), rows(2, 1e-5)
     both = stack([one, other])
     assert np.allclose(both.errors, (one.errors * one.rows[0] + other.errors * other.rows[0]) / both.rows[0])
@@ -164,8 +166,8 @@ def test_bad_settings():
         (tls(position_error=1.0, step=2), "step"),
     ):
         with pytest.raises(SettingsError, match=words):
-            estimate(seen, settings)
+            estimate_of(seen, settings)
     with pytest.raises(SettingsError, match="with_errors"):
-        estimate(replace(seen, errors=None), tls(position_error=1.0))
+        estimate_of(replace(seen, errors=None), tls(position_error=1.0))
     with pytest.raises(SettingsError, match="median"):
         with_errors(EMPS, axis(0, 0.0), replace(STUDY, signals=Signals()), rows(0, 1e-5), 1e-5)

@@ -1,6 +1,7 @@
 """Whiteness, drawn blocks, F-tests and sets by threshold: against scipy's own, against scatter, on residuals whose colour is known."""
 
 import json
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -9,13 +10,13 @@ from planar_data import OLS, WLS, observation
 from scipy import stats
 from scipy.signal import lfilter
 
-from runtime.estimators import estimate
-from runtime.estimators.essential import essential
-from runtime.estimators.estimate import json_text
+from runtime.estimators.essential import essential_of
+from runtime.estimators.methods import estimate_of
 from runtime.identification.residuals import effective_share, joint_whiteness
-from runtime.identification.uncertainty import f_tests, scatter, trust
+from runtime.identification.uncertainty import block_bootstrap, f_tests, uncertainty
 from runtime.identification.validation import JointComparison, direct_comparison
-from runtime.reporting.uncertainty import trust_section
+from runtime.json_documents import json_text
+from runtime.reporting.uncertainty import uncertainty_section
 from runtime.settings.study import EssentialSettings, EstimateSettings
 
 
@@ -56,6 +57,26 @@ def test_coloured_residuals_are_worth_fewer_rows():
     assert w.half < 2.0 and np.trapezoid(w.density, w.frequency) == pytest.approx(np.var(e), rel=0.05)
 
 
+def test_rows_that_count_over_a_long_memory():
+    """First order, 0.99 from row to row: (1 - 0.99)/(1 + 0.99) of 4000 rows are 20; 20 lags alone would say 111."""
+    rng = np.random.default_rng(4)
+    worth = [joint_whiteness(joint(lfilter([1], [1, -0.99], rng.standard_normal(6000))[2000:]), 30.0).effective_rows for _ in range(40)]
+    assert np.median(worth) == pytest.approx(20, rel=0.35)
+
+
+def test_records_a_month_apart_take_the_room_of_their_rows():
+    e = coloured(np.random.default_rng(5).standard_normal(2000))
+    t = np.arange(1000) / 125
+    month = 30 * 24 * 3600.0
+    tracemalloc.start()
+    apart = joint_whiteness(joint(e, np.concatenate([t, t + month]), 125.0), 125.0)
+    assert tracemalloc.get_traced_memory()[1] < 2e6
+    tracemalloc.stop()
+    together = joint_whiteness(joint(e, np.concatenate([t, t]), 125.0), 125.0)
+    assert np.array_equal(apart.correlation, together.correlation) and apart.effective_rows == together.effective_rows
+    assert np.array_equal(apart.density, together.density)
+
+
 def test_gaps_and_records_are_no_neighbours():
     rng = np.random.default_rng(3)
     e = coloured(rng.standard_normal(3000))
@@ -73,11 +94,11 @@ def test_drawn_deviations_match_the_scatter_where_sigma_does_not():
     found, drawn, sigma = [], [], []
     for seed in range(120):
         seen = observation(N=900, noise=(0.5, 0.2), seed=seed, colour=coloured)
-        fit = estimate(seen, settings)
+        fit = estimate_of(seen, settings)
         found.append(fit.X)
         sigma.append(fit.sigma)
         if seed < 30:
-            drawn.append(scatter(seen, settings, fit).drawn)
+            drawn.append(block_bootstrap(seen, settings, fit).drawn)
     real = np.std(found, axis=0, ddof=1)
     assert np.mean(real / np.mean(sigma, axis=0)) > 1.4
     assert np.median(np.mean(drawn, axis=0) / real) == pytest.approx(1, abs=0.15)
@@ -87,17 +108,17 @@ def test_drawn_deviations_match_the_scatter_where_sigma_does_not():
 def test_whole_record_drawn_once_is_the_estimate(settings):
     """The sum of the blocks is the record: its solution is the fit; few draws agree with many."""
     seen = observation(N=600, noise=(0.5, 0.1))
-    fit = estimate(seen, settings)
-    one, other = scatter(seen, settings, fit, runs=300, seed=1), scatter(seen, settings, fit, runs=300, seed=2)
+    fit = estimate_of(seen, settings)
+    one, other = block_bootstrap(seen, settings, fit, runs=300, seed=1), block_bootstrap(seen, settings, fit, runs=300, seed=2)
     assert np.allclose(one.drawn, other.drawn, rtol=0.25) and np.array_equal(
-        one.drawn, scatter(seen, settings, fit, runs=300, seed=1).drawn
+        one.drawn, block_bootstrap(seen, settings, fit, runs=300, seed=1).drawn
     )
     assert np.median(one.drawn / fit.sigma_corrected) == pytest.approx(1, abs=0.12)
 
 
 def test_f_is_that_of_two_nested_fits():
     seen = observation(noise=(6.0, 2.0), seed=3)
-    found = essential(seen, EssentialSettings(1.04), OLS)
+    found = essential_of(seen, EssentialSettings(1.04), OLS)
     tests = f_tests(found)
     r, b = seen.W.shape
     S0 = np.sum((seen.Y - seen.W @ np.linalg.lstsq(seen.W, seen.Y, rcond=None)[0]) ** 2)
@@ -118,12 +139,12 @@ def test_f_is_that_of_two_nested_fits():
 
 def test_sets_by_threshold_and_what_is_shown():
     seen = observation(noise=(9.0, 4.0), seed=5)
-    found = essential(seen, EssentialSettings(1.03), OLS)
-    checked = trust(seen, OLS, found, direct_comparison(seen, found.estimate))
+    found = essential_of(seen, EssentialSettings(1.03), OLS)
+    checked = uncertainty(seen, OLS, found, direct_comparison(seen, found.estimate))
     by_threshold = {threshold: (count, names) for threshold, count, names in checked.sets}
     assert by_threshold[1.03] == (len(found.names), ())
     for threshold, (count, names) in by_threshold.items():
-        kept = essential(seen, EssentialSettings(threshold), OLS).names
+        kept = essential_of(seen, EssentialSettings(threshold), OLS).names
         assert count == len(kept)
         expected = {f"-{n}" for n in found.names if n not in kept} | {f"+{n}" for n in kept if n not in found.names}
         assert set(names) == expected
@@ -135,13 +156,13 @@ def test_sets_by_threshold_and_what_is_shown():
         and len(data["scatter"]["drawn"]) == len(found.names)
         and data["f_tests"][0]["name"] == found.trail[0].name
     )
-    section = trust_section(checked)
+    section = uncertainty_section(checked)
     assert [len(t.rows) for t in section.tables] == [len(found.names), 2, len(found.trail), len(found.counts)]
 
 
 def test_a_record_that_determines_nothing_is_no_error():
     seen = observation()
     lost = replace(seen, W=np.column_stack([seen.W[:, 0], seen.W[:, :-1]]))
-    found = essential(lost, EssentialSettings(), OLS)
-    checked = trust(lost, OLS, found, direct_comparison(lost, found.estimate))
-    assert len(checked.scatter.drawn) == len(found.names)
+    found = essential_of(lost, EssentialSettings(), OLS)
+    checked = uncertainty(lost, OLS, found, direct_comparison(lost, found.estimate))
+    assert len(checked.bootstrap.drawn) == len(found.names)

@@ -9,14 +9,14 @@ import pytest
 from planar_data import TRUE, motion, observation
 
 from runtime.errors import InputError
-from runtime.estimators import estimate
+from runtime.estimators.methods import estimate_of
 from runtime.identification.validation import cross_validation, direct_comparison, split_validation, weak_directions
 from runtime.settings.study import EstimateSettings
 
 
 def test_comparison_holds_the_torques_of_every_joint():
     seen = observation(noise=(0.3, 0.05), seed=1)
-    found = estimate(seen, model=planar)
+    found = estimate_of(seen, model=planar)
     compared = direct_comparison(seen, found)
     assert [joint.joint for joint in compared] == ["1", "2"]
     assert np.isclose(compared.relative_error, found.relative_error)
@@ -29,7 +29,7 @@ def test_comparison_holds_the_torques_of_every_joint():
 
 def test_comparison_uses_the_columns_of_the_estimate():
     seen = observation(noise=(0.3, 0.05), seed=1)
-    found = estimate(seen, EstimateSettings(columns=("MX1R", "FS2", "FV1")))
+    found = estimate_of(seen, EstimateSettings(columns=("MX1R", "FS2", "FV1")))
     predicted = np.concatenate([joint.predicted for joint in direct_comparison(seen, found)])
     assert np.allclose(predicted, seen.W[:, [1, 9, 3]] @ found.X)
     with pytest.raises(InputError, match="FS2"):
@@ -46,7 +46,7 @@ def test_other_records_are_predicted():
         ("fit", "essential", 7, True),
         ("second", "essential", 7, False),
     ]
-    found = estimate(fit)
+    found = estimate_of(fit)
     assert np.isclose(result.predictions[0].relative_error, found.relative_error)
     expected = 100 * np.linalg.norm(other.Y - other.W @ found.X) / np.linalg.norm(other.Y)
     assert np.isclose(result.predictions[1].relative_error, expected)
@@ -58,7 +58,7 @@ def test_windows_of_one_record():
     seen = observation(noise=(0.3, 0.05), seed=1)
     result = split_validation(seen, [(0, 5), (5.01, None)])
     assert [p.part for p in result.predictions] == ["[0, 5] s", "[5.01, ] s"]
-    found = estimate(seen.between(0, 5))
+    found = estimate_of(seen.between(0, 5))
     late = seen.between(5.01, None)
     assert np.isclose(result.predictions[1].relative_error, 100 * np.linalg.norm(late.Y - late.W @ found.X) / np.linalg.norm(late.Y))
     with pytest.raises(InputError, match="at least two"):
@@ -89,7 +89,7 @@ def test_correlations_are_those_of_the_covariance():
     assert len(found.warnings) == len(found.groups) and all(
         ", ".join(g[:-1]) in w for g, w in zip(found.groups, found.warnings, strict=True)
     )
-    C = estimate(seen, EstimateSettings(method="wls")).covariance
+    C = estimate_of(seen, EstimateSettings(method="wls")).covariance
     for pair in found.pairs:
         i, k = seen.names.index(pair.first), seen.names.index(pair.second)
         assert np.isclose(pair.correlation, C[i, k] / np.sqrt(C[i, i] * C[k, k]))

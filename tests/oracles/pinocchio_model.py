@@ -102,7 +102,7 @@ class PinocchioModel:
 
 
 def _depth_first(robot: Robot, i: int) -> list[int]:
-    return [k for j in robot.children(i) for k in (j, *_depth_first(robot, j))]
+    return [k for f in robot.frames if f.ant == i for k in (f.j, *_depth_first(robot, f.j))]
 
 
 def placement(robot: Robot, f: Frame) -> Any:

@@ -18,8 +18,7 @@ from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion, joint_torques
 from symgen.description import Robot
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
-from symgen.description.urdf import read_urdf
-from symgen.description.urdf_text import parse_urdf
+from symgen.description.urdf import parse_urdf, read_urdf
 from symgen.description.urdf_write import write_urdf
 from symgen.errors import DescriptionError
 

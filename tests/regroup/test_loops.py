@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from symgen.derive import loops
 from symgen.derive.loops import close, find_relations
 from symgen.description import Robot, load_robot, parse_robot
 from symgen.description.expression import ONE
@@ -226,6 +227,12 @@ def test_certified_and_every_perturbed_coefficient_caught(name: str) -> None:
 # --- mechanisms that cannot be -----------------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def few_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What cannot close is given up after few starts: the message is the same, the time a tenth."""
+    monkeypatch.setattr(loops, "STARTS", 5)
+
+
 JACK = b"""
 symgen: 1
 name: jack
@@ -249,13 +256,13 @@ def test_jack_that_fits_no_stroke_drawn_at_random() -> None:
     assert 1e-3 <= abs(small.start[3]) <= 5e-3
 
 
-def test_frames_that_cannot_coincide() -> None:
+def test_frames_that_cannot_coincide(few_starts: None) -> None:
     """alpha5 = +pi/2 in Table 5: the two planes are turned against each other."""
     with pytest.raises(DescriptionError, match=r"frame 7 \(cut\) and frame 8 \(twin\) cannot coincide; they come as close as 1\.86"):
         close(changed(load_robot("haptic"), 5, alpha="pi/2"))
 
 
-def test_sides_too_long() -> None:
+def test_sides_too_long(few_starts: None) -> None:
     robot = load_robot("four_bar")
     with pytest.raises(DescriptionError, match=r"frame 4 \(cut\) and frame 5 \(twin\) cannot coincide; they come as close as 0\.\d+"):
         close(replace(robot, constants=dict(robot.constants) | {"L0": 1.5}))
@@ -266,7 +273,7 @@ def test_twin_must_be_fixed() -> None:
         changed(load_robot("haptic"), 8, sigma=0, theta="q8")
 
 
-def test_too_many_actuators() -> None:
+def test_too_many_actuators(few_starts: None) -> None:
     with pytest.raises(
         DescriptionError, match=r"mobility is 3, but 4 joints are actuated \(\[1, 2, 3, 5\]\); the mechanism is over-constrained"
     ):
@@ -278,7 +285,7 @@ def test_too_few_actuators() -> None:
         close(changed(load_robot("haptic"), 5, mu=0))
 
 
-def test_over_constrained_mechanism() -> None:
+def test_over_constrained_mechanism(few_starts: None) -> None:
     """A diagonal bar between arm 2 and crank 5 freezes the parallelogram: it turns as a whole, no more."""
     robot = load_robot("haptic")
     zero = parse("0")
@@ -296,7 +303,7 @@ def test_passive_joint_without_relation() -> None:
 
 
 @pytest.mark.parametrize("wrong", ["q5 - q2", "q5 + q2 + pi"])
-def test_declared_relation_that_contradicts_the_closure(wrong: str) -> None:
+def test_declared_relation_that_contradicts_the_closure(wrong: str, few_starts: None) -> None:
     """Both sides, and how far frames 7 and 8 are apart with the declared one."""
     with pytest.raises(
         DescriptionError, match=r"q3: declared .*, the closure gives pi - q2 \+ q5; .* frame 7 \(cut\) and frame 8 .* are 1\.\d+ apart"
@@ -304,13 +311,13 @@ def test_declared_relation_that_contradicts_the_closure(wrong: str) -> None:
         close(haptic(q4="c - q5", q3=wrong))
 
 
-def test_only_the_wrong_one_is_named() -> None:
+def test_only_the_wrong_one_is_named(few_starts: None) -> None:
     with pytest.raises(DescriptionError, match="closure; q7: declared") as error:
         close(haptic(q4="c - q5", q3="q5 - q2 + pi", q6="q2 - q5", q7="q3 + pi"))
     assert "q3: declared" not in str(error.value) and "q6: declared" not in str(error.value)
 
 
-def test_lengths_that_make_a_declared_parallelogram_impossible() -> None:
+def test_lengths_that_make_a_declared_parallelogram_impossible(few_starts: None) -> None:
     unequal = changed(haptic(q4="c - q5", q3="q5 - q2 + pi"), 7, d="0.25")
     with pytest.raises(
         DescriptionError, match=r"q3: declared pi - q2 \+ q5, the closure gives no linear relation \(these lengths make no parallelogram\)"

@@ -1,4 +1,4 @@
-"""Parts of a report against what was not written for it: CAD values, extremes of long records, names, the judgement and its limits."""
+"""Parts of a report against what was not written for it: CAD values, extremes of long records, names, the checklist and its limits."""
 
 import base64
 import re
@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from runtime.estimators.estimate import Estimate, JointFit
-from runtime.identification.checklist import apart, graded, judge
-from runtime.identification.identification import lost_joints
+from runtime.identification.checklist import _state, checklist_of, lost_joints, separate
 from runtime.identification.validation import JointComparison
 from runtime.markup import split, symbol, unit
 from runtime.model.generated import load_model
-from runtime.reporting.correlations import correlations
+from runtime.reporting.correlations import correlation_matrix
 from runtime.reporting.parameters import cad_values, roles_of
 from runtime.reporting.residuals import decimation_cutoff
 from runtime.reporting.series import extremes, gaps, series
@@ -104,13 +103,9 @@ def fit(X=(1.0, 2.0), sigma=(0.01, 0.02), correlation=0.0, error=4.0, joints=(3.
     return replace(made, **changed)
 
 
-def identified(estimate, unseen=5.0, negative=()):
-    scatter = SimpleNamespace(names=estimate.names, drawn=2.5 * estimate.sigma)
-    prediction = SimpleNamespace(fitted=False, columns="essential", relative_error=unseen)
-    return SimpleNamespace(
-        every=estimate, carried=estimate, found=SimpleNamespace(estimate=estimate), validation=(SimpleNamespace(predictions=(prediction,)),),
-        trust=SimpleNamespace(scatter=scatter), verdict="2 of 2.", negative=negative,
-    )  # fmt: skip
+def checked(estimate, unseen=5.0, *, every=None, **asked):
+    deviations = dict(zip(estimate.names, 2.5 * estimate.sigma, strict=True))
+    return checklist_of(every or estimate, estimate, "2 of 2.", bootstrap=deviations, prediction_error=unseen, **asked)
 
 
 @pytest.mark.parametrize(("estimate", "unseen", "state", "question"), [
@@ -129,30 +124,29 @@ def identified(estimate, unseen=5.0, negative=()):
     (fit(status="rank-deficient", rank=1, groups=(("A1", "B1"),)), 5.0, "no", "determine"),
 ])  # fmt: skip
 def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
-    judgement = judge(identified(estimate, unseen))
-    assert judgement.state == state
-    assert judgement.answer == {"good": "Yes, as far as judged", "doubtful": "With care", "no": "No"}[state]
+    checklist = checked(estimate, unseen)
+    assert checklist.state == state
+    assert checklist.answer == {"good": "Yes, as far as judged", "doubtful": "With care", "no": "No"}[state]
     if question is None:
-        assert judgement.worst is None and "not judged" in judgement.doubt
+        assert checklist.worst is None and "not judged" in checklist.doubt
     else:
         assert (
-            question in judgement.worst.question and judgement.worst.found in judgement.doubt and judgement.worst.remedy in judgement.next
+            question in checklist.worst.question and checklist.worst.finding in checklist.doubt and checklist.worst.remedy in checklist.next
         )
-    assert set(judgement.summary()) == {"state", "answer", "use", "doubt", "next", "checks"}
+    assert set(checklist.summary()) == {"state", "answer", "use", "doubt", "next", "checks"}
 
 
 def test_negative_friction_is_not_for_use():
-    judgement = judge(identified(fit(), negative=("Ia2", "FS2")))
-    assert judgement.state == "no" and "Below zero: Ia2, FS2" in judgement.doubt and "sign of ratio" in judgement.next
+    checklist = checked(fit(), negative=("Ia2", "FS2"))
+    assert checklist.state == "no" and "Below zero: Ia2, FS2" in checklist.doubt and "sign of ratio" in checklist.next
 
 
 def test_physical_consistency_counts():
-    found = identified(fit())
     bad = SimpleNamespace(feasible=False, blocking=(("link 3", -0.01),), margin=-0.01)
-    judgement = judge(found, feasibility=bad)
-    assert judgement.state == "doubtful" and "link 3" in judgement.doubt and "feasible" in judgement.next
-    assert judge(found, feasibility=SimpleNamespace(feasible=True, blocking=(), margin=0.1)).state == "good"
-    assert judge(identified(fit(details={"standard": {}}))).state == "good"
+    checklist = checked(fit(), feasibility=bad)
+    assert checklist.state == "doubtful" and "link 3" in checklist.doubt and "feasible" in checklist.next
+    assert checked(fit(), feasibility=SimpleNamespace(feasible=True, blocking=(), margin=0.1)).state == "good"
+    assert checked(fit(details={"standard": {}})).state == "good"
 
 
 @pytest.mark.parametrize(("error", "state"), [(0.5, "good"), (3.0, "doubtful"), (8.0, "no")])
@@ -161,31 +155,31 @@ def test_encoder_in_use_counts(error, state):
     advice = SimpleNamespace(
         encoders=[SimpleNamespace(limits=limits)], unit="rad", place="at the motors", asked=(1e-3,), worst=lambda k: ("A1", error)
     )
-    asked = judge(identified(fit(details={"standard": {}})), advice=advice)
-    assert "5 % up to 0.0002 rad (2*pi/31416) at the motors" in asked.checks[-1].found
+    asked = checked(fit(details={"standard": {}}), advice=advice)
+    assert "5 % up to 0.0002 rad (2*pi/31416) at the motors" in asked.checks[-1].finding
     assert asked.state == state and asked.answer == {"good": "Yes", "doubtful": "With care", "no": "No"}[state]
     advice.asked = ()
-    judgement = judge(identified(fit()), advice=advice)
-    assert judgement.state == "good" and judgement.checks[-1].state == "open" and "--encoder" in judgement.checks[-1].remedy
+    checklist = checked(fit(), advice=advice)
+    assert checklist.state == "good" and checklist.checks[-1].state == "open" and "--encoder" in checklist.checks[-1].remedy
 
 
 def test_limits_are_inclusive():
-    assert [graded(x, 1.0, 5.0) for x in (1.0, 1.1, 5.0, 5.1)] == ["good", "doubtful", "doubtful", "no"]
+    assert [_state(x, 1.0, 5.0) for x in (1.0, 1.1, 5.0, 5.1)] == ["good", "doubtful", "doubtful", "no"]
 
 
 def test_correlations_by_name():
-    matrix = correlations(fit(correlation=-0.95))
+    matrix = correlation_matrix(fit(correlation=-0.95))
     assert matrix.cells == [[("+1.00", 4), ("−0.95", 4)], [("−0.95", 4), ("+1.00", 4)]]
-    assert correlations(fit(sigma=(0.0, 0.1))) is None
-    assert apart(fit(correlation=0.89)).state == "good"
+    assert correlation_matrix(fit(sigma=(0.0, 0.1))) is None
+    assert separate(fit(correlation=0.89)).state == "good"
 
 
 def test_roles_tell_the_order_of_removal():
     steps = [SimpleNamespace(name=n, ratio=r, removed=x) for n, r, x in (("C1", 1.001, True), ("D1", 1.01, True), ("B1", 1.05, False))]
     kept = SimpleNamespace(names=("A1", "B1"))
     essential = SimpleNamespace(estimate=kept, names=kept.names, trail=steps)
-    found = SimpleNamespace(found=essential, carried=kept, every=SimpleNamespace(names=("A1", "B1", "C1", "D1")))
-    assert roles_of(found) == {
+    result = SimpleNamespace(essential=essential, model_columns="essential", estimate=SimpleNamespace(names=("A1", "B1", "C1", "D1")))
+    assert roles_of(result) == {
         "A1": "essential", "B1": "essential, the next to go: ratio 1.0500", "C1": "removed no. 1, ratio 1.0010", "D1": "removed no. 2, ratio 1.0100",
     }  # fmt: skip
 
@@ -195,12 +189,10 @@ def test_a_joint_lost_with_the_removed_parameters_is_told(scale, remedy):
     """A lift in N beside a wrist in N m: all parameters explain the wrist, the essential ones do not."""
     every = fit(joints=(2.0, 15.5))
     every = replace(every, per_joint=tuple(replace(joint, scale=scale) for joint in every.per_joint))
-    found = identified(fit(joints=(2.0, 99.0)))
-    found.every = every
-    judgement = judge(found)
+    checklist = checked(fit(joints=(2.0, 99.0)), every=every)
     assert (
-        judgement.state == "no"
-        and "15.5 % of joint 2 unexplained, the essential ones 99.0 %" in judgement.next
-        and remedy in judgement.next
+        checklist.state == "no"
+        and "15.5 % of joint 2 unexplained, the essential ones 99.0 %" in checklist.next
+        and remedy in checklist.next
     )
     assert lost_joints(every, every) == "" and lost_joints(fit(joints=(2.0, 80.0)), fit(joints=(2.0, 99.0))) == ""

@@ -2,77 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import prod
+from typing import Protocol
 
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.records.formats.naming import check_names
-
-Array = np.ndarray
+from runtime.records.formats.columns import WIDEST, Array, Groups, Table, check_names
 
 
-@dataclass(frozen=True, eq=False)
-class ArrayTable:
-    """Numeric arrays by name; (N, 1) and (1, N) are vectors, a single element is a scalar. others : what else the file holds, by name."""
-
-    file: str
-    arrays: Mapping[str, Array]
-    others: Mapping[str, str] = field(default_factory=dict)
+class Series(Protocol):
+    """An array that is read by blocks."""
 
     @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.arrays)
+    def shape(self) -> tuple[int, ...]:
+        """As stored."""
 
-    def stack(self, names: Sequence[str]) -> Array:
-        """The named vectors and the columns of the named matrices side by side, shape (N, k)."""
-        parts = [self._columns(name) for name in self._present(names)]
-        lengths = {name: len(part) for name, part in zip(names, parts, strict=True)}
-        if len(set(lengths.values())) > 1:
-            raise InputError(f"columns of different lengths: {', '.join(f'{k} {v}' for k, v in lengths.items())}", file=self.file)
-        return np.hstack(parts)
-
-    def scalar(self, name: str) -> float:
-        """The single number called `name`."""
-        self._present([name])
-        if self.arrays[name].size != 1:
-            raise InputError(f"{self.arrays[name].shape} values; expected a single number", file=self.file, column=name)
-        return float(self.arrays[name].reshape(()))
-
-    def row(self, i: int) -> str:
-        return f"sample {i + 1}"
-
-    def _present(self, names: Sequence[str]) -> Sequence[str]:
-        for name in names:
-            if name in self.others:
-                raise InputError(f"{self.others[name]}; expected an array of numbers", file=self.file, column=name)
-        return check_names(names, self.names, self.file)
-
-    def _columns(self, name: str) -> Array:
-        x = self.arrays[name]
-        if x.ndim == 2 and x.shape[0] == 1:
-            x = x.T
-        if x.ndim > 2 or (x.ndim == 2 and x.shape[0] < x.shape[1]):
-            raise InputError(f"shape {x.shape}; expected (N,) or (N, k), samples along the first axis", file=self.file, column=name)
-        if not x.size:
-            raise InputError("no samples", file=self.file, column=name)
-        return x.reshape(len(x) if x.ndim else 1, -1).astype(float)
+    def blocks(self, size: int) -> Iterator[Array]:
+        """Consecutive samples, shape (B, k); (1, N) is a vector."""
 
 
 @dataclass(frozen=True, eq=False)
-class ArrayBlock(ArrayTable):
-    """Samples `first`, first + 1 ... of arrays whose shapes were checked as a whole; scalars as they are."""
+class Held:
+    """An array in memory."""
 
-    first: int = 0
+    array: Array
 
-    def row(self, i: int) -> str:
-        return f"sample {self.first + i + 1}"
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """As stored."""
+        return self.array.shape
 
-    def _columns(self, name: str) -> Array:
-        return self.arrays[name].reshape(len(self.arrays[name]), -1).astype(float)
+    def blocks(self, size: int) -> Iterator[Array]:
+        """Consecutive samples, shape (B, k)."""
+        N = samples_of(self.shape)
+        columns = self.array.reshape(N, prod(self.shape) // N)
+        return (columns[a : a + size] for a in range(0, N, size))
 
 
-def numeric(arrays: Mapping[str, object]) -> dict[str, Array]:
-    """Those of the arrays that hold real numbers (booleans included)."""
-    return {k: v for k, v in arrays.items() if isinstance(v, np.ndarray) and v.dtype.kind in "biuf"}
+def samples_of(shape: tuple[int, ...]) -> int:
+    """Length along the axis of the samples; (N,), (1, N) and (N, 1) are vectors, () is one sample."""
+    return max(shape, default=1) if shape[:1] in ((), (1,)) else shape[0]
+
+
+@dataclass(eq=False, kw_only=True)
+class ArrayTable(Table):
+    """Numeric arrays by name.
+
+    Attributes
+    ----------
+    arrays : mapping of str to Series
+        What may be read.
+    others : mapping of str to str
+        What else the file holds, in words.
+    """
+
+    arrays: Mapping[str, Series]
+    others: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.names = tuple(self.arrays)
+
+    def samples(self, groups: Groups) -> int:
+        lengths = {name: samples_of(self._series(name).shape) for group in groups for name in group}
+        if len(set(lengths.values())) > 1:
+            raise InputError(f"columns of different lengths: {', '.join(f'{k} {v}' for k, v in lengths.items())}", file=self.file)
+        return next(iter(lengths.values()))
+
+    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
+        self.samples([names])
+        return zip(*(self._series(name).blocks(size) for name in names), strict=True)
+
+    def require(self, names: Sequence[str]) -> None:
+        for name in names:
+            self._series(name)
+
+    def scalar(self, name: str) -> float:
+        x = self._array(name)
+        if prod(x.shape) != 1:
+            raise InputError(f"{x.shape} values; expected a single number", file=self.file, column=name)
+        return float(next(x.blocks(1)).reshape(()))
+
+    def _array(self, name: str) -> Series:
+        if name in self.others:
+            raise InputError(f"{self.others[name]}; expected an array of numbers", file=self.file, column=name)
+        check_names([name], self.names, self.file)
+        return self.arrays[name]
+
+    def _series(self, name: str) -> Series:
+        """The array of that name, if it is one of samples."""
+        x = self._array(name)
+        if len(x.shape) > 2 or (len(x.shape) == 2 and 1 < x.shape[0] < x.shape[1]):
+            raise InputError(f"shape {x.shape}; expected (N,) or (N, k), samples along the first axis", file=self.file, column=name)
+        if not prod(x.shape):
+            raise InputError("no samples", file=self.file, column=name)
+        if prod(x.shape) // samples_of(x.shape) > WIDEST:
+            raise InputError(f"shape {x.shape}; at most {WIDEST} columns are read", file=self.file, column=name)
+        return x
+
+
+def is_numeric(dtype: np.dtype) -> bool:
+    """Whether numbers of that type are real; booleans are."""
+    return dtype.kind in "biuf"

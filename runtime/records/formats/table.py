@@ -1,113 +1,122 @@
-"""What every reader of measured files returns: named columns of numbers."""
+"""The formats of measured files, one row each, and how a file is opened.
+
+A file that a library reads, and one that has to be unpacked whole, is read in a process of its own with limits of time and memory
+(`runtime.records.formats.isolated`). Text, which is unpacked line by line, and plain NumPy files are read here.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Protocol
-
-import numpy as np
+from typing import Literal
 
 from runtime.errors import InputError
-from runtime.files import read_bytes, sha256
-from runtime.records.formats.bags import read_bag
-from runtime.records.formats.mat import read_mat
-from runtime.records.formats.npz import npy_blocks, npz_blocks, read_npy, read_npz
-from runtime.records.formats.parquet import parquet_blocks, read_parquet
-from runtime.records.formats.text import read_text, text_blocks
-
-Array = np.ndarray
-
-
-class Named(Protocol):
-    """A file whose columns have names."""
-
-    @property
-    def file(self) -> str:
-        """Name of the file."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
+from runtime.files import sha256_of
+from runtime.records.formats.bags import digest_of, open_bag
+from runtime.records.formats.columns import Source, Table
+from runtime.records.formats.isolated import IsolatedTable
+from runtime.records.formats.mat import open_mat
+from runtime.records.formats.npz import open_npy, open_npz
+from runtime.records.formats.parquet import open_parquet
+from runtime.records.formats.text import open_text
 
 
-class Table(Named, Protocol):
-    """Columns of one file."""
+@dataclass(frozen=True)
+class Format:
+    """How one format is read.
 
-    def stack(self, names: Sequence[str]) -> Array:
-        """The named columns side by side, shape (N, k)."""
-
-    def scalar(self, name: str) -> float:
-        """A single number stored in the file."""
-
-    def row(self, i: int) -> str:
-        """How the file counts sample i (from 0): "line 12" or "sample 12"."""
-
-
-READERS: Mapping[str, Callable[[bytes, str], Table]] = {
-    ".csv": read_text,
-    ".txt": read_text,
-    ".dat": read_text,
-    ".tsv": read_text,
-    ".npy": read_npy,
-    ".npz": read_npz,
-    ".parquet": read_parquet,
-    ".mat": read_mat,
-}
-BAGS = (".bag", ".mcap", ".db3")
-KINDS = (*READERS, *BAGS)
-
-
-class BlockTable(Named, Protocol):
-    """Columns of one file that is read by blocks."""
-
-    def samples(self, names: Sequence[str]) -> int:
-        """Length of the named columns."""
-
-    def blocks(self, names: Sequence[str], size: int) -> Iterator[Table]:
-        """Tables of `size` samples that hold the named columns, in order, as often as asked."""
-
-
-BLOCK_READERS: Mapping[str, Callable[[Path, str], BlockTable]] = {
-    **dict.fromkeys((".csv", ".txt", ".dat", ".tsv"), text_blocks),
-    ".npy": npy_blocks,
-    ".npz": npz_blocks,
-    ".parquet": parquet_blocks,
-}
-
-
-def open_table(path: Path, decimal: str = ".") -> BlockTable:
-    """A file to be read by blocks; InputError for formats that are read whole only.   decimal : of the numbers of a text file."""
-    kind = _kind(path)
-    if kind not in BLOCK_READERS:
-        what = "bags" if kind in BAGS else f"{kind} files"
-        raise InputError(
-            f"{what} are read whole; convert to {', '.join(BLOCK_READERS)} to read by blocks, or set stream: off", file=str(path)
-        )
-    if path.suffix.lower() == ".gz" and BLOCK_READERS[kind] is not text_blocks:
-        raise InputError(f"a {kind} file within .gz cannot be read by blocks; uncompress it, or set stream: off", file=str(path))
-    if not path.is_file():
-        raise InputError("cannot be read: no such file", file=str(path))
-    return text_blocks(path, path.name, decimal) if BLOCK_READERS[kind] is text_blocks else BLOCK_READERS[kind](path, path.name)
-
-
-def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> tuple[Table, str]:
-    """Table of a measured file, and the SHA-256 of its uncompressed bytes.
-
-    path : .csv, .txt, .dat, .tsv, .npy, .npz, .parquet or .mat, perhaps ending in .gz; .bag, .mcap, .db3 or the folder of a ROS 2 bag.
-    topic : of a bag; default: the only one that holds sensor_msgs/JointState.   decimal : "." or ",", of the numbers of a text file.
+    Attributes
+    ----------
+    title : str
+        What a file of it is, in messages.
+    endings : tuple of str
+        Of file names, in lower case.
+    open : callable
+        The table of a file.
+    libraries : tuple of str
+        Modules that read it; none: it is read in this process.
+    extra : str
+        Optional dependencies of this project that bring the libraries.
+    by_blocks : bool
+        Whether a file larger than memory can be read.
+    packed : str
+        How a file compressed by gzip is read: by parts, whole, or not at all ("").
+    digest : callable
+        SHA-256 of a file.
     """
-    kind = _kind(path)
-    if kind not in BAGS:
-        data = read_bytes(path)
-        return read_text(data, path.name, decimal) if READERS[kind] is read_text else READERS[kind](data, path.name), sha256(data)
-    if path.suffix.lower() == ".gz":
+
+    title: str
+    endings: tuple[str, ...]
+    open: Callable[[Source], Table]
+    libraries: tuple[str, ...] = ()
+    extra: str = ""
+    by_blocks: bool = True
+    packed: Literal["parts", "whole", ""] = "whole"
+    digest: Callable[[Path], str] = sha256_of
+
+
+FORMATS = (
+    Format("a text file", (".csv", ".txt", ".dat", ".tsv"), open_text, packed="parts"),
+    Format("a file of one plain array", (".npy",), open_npy),
+    Format("an archive of plain arrays", (".npz",), open_npz),
+    Format("a Parquet file", (".parquet",), open_parquet, ("polars",), "tables"),
+    Format("a MATLAB file", (".mat",), open_mat, ("scipy.io",), "tables", by_blocks=False),
+    Format("a whole bag", (".bag", ".mcap", ".db3"), open_bag, ("rosbags",), "bags", False, "", digest_of),
+)
+BY_ENDING = {ending: format_ for format_ in FORMATS for ending in format_.endings}
+KINDS = tuple(BY_ENDING)
+BAG = ".db3"  # a folder is read as one
+
+
+def open_table(path: Path, topic: str | None = None, decimal: str = ".", *, by_blocks: bool = False) -> Table:
+    """Table of a measured file; its hash is computed first, so that nothing that unpacks to more than a record holds is opened.
+
+    Parameters
+    ----------
+    path : Path
+        A file whose name ends as one of KINDS, perhaps followed by .gz, or the folder of a ROS 2 bag.
+    topic : str, optional
+        Of a bag; default: the only one that holds sensor_msgs/JointState.
+    decimal : str
+        "." or ",", of the numbers of a text file.
+    by_blocks : bool
+        Refuse formats that are read whole only.
+    """
+    format_ = format_of(path)
+    require_readable(path, format_, by_blocks)
+    if missing := [library for library in format_.libraries if find_spec(library.partition(".")[0]) is None]:
+        raise InputError(needed(format_), file=path.name) from ImportError(missing[0])
+    source, digest = Source(path, topic, decimal), format_.digest(path)
+    isolated = format_.libraries or (source.packed and format_.packed == "whole")
+    table = IsolatedTable.start(source, format_.title) if isolated else format_.open(source)
+    table.digest = digest
+    return table
+
+
+def needed(format_: Format) -> str:
+    """What to install where a library is missing."""
+    return f"{format_.title} needs an optional library: pip install symgen[{format_.extra}]"
+
+
+def require_readable(path: Path, format_: Format, by_blocks: bool) -> None:
+    """Raise InputError where there is no such file, or it cannot be read as asked."""
+    packed = path.suffix.lower() == ".gz"
+    if by_blocks and not format_.by_blocks:
+        what = "bags" if format_.digest is digest_of else f"{format_.endings[0]} files"
+        choices = ", ".join(ending for ending, other in BY_ENDING.items() if other.by_blocks)
+        raise InputError(f"{what} are read whole; convert to {choices} to read by blocks, or set stream: off", file=str(path))
+    if packed and not format_.packed:
         raise InputError("a bag within .gz; uncompress it", file=str(path))
+    if packed and by_blocks and format_.packed == "whole":
+        raise InputError(
+            f"a {format_.endings[0]} file within .gz cannot be read by blocks; uncompress it, or set stream: off", file=str(path)
+        )
     if not path.exists():
         raise InputError("cannot be read: no such file", file=str(path))
     if path.is_dir() and not (path / "metadata.yaml").is_file():
         raise InputError("a folder without metadata.yaml, hence no ROS 2 bag; name the measured or study file in it", file=str(path))
-    return read_bag(path, topic)
 
 
 def is_measured(path: Path) -> bool:
@@ -115,13 +124,14 @@ def is_measured(path: Path) -> bool:
     return path.is_dir() or any(suffix.lower() in KINDS for suffix in path.suffixes)
 
 
-def _kind(path: Path) -> str:
-    """The ending of a file that tells its format; a folder is a bag."""
-    suffixes = [".db3"] if path.is_dir() else [s.lower() for s in path.suffixes if s.lower() != ".gz"]
+def format_of(path: Path) -> Format:
+    """The format that the ending of a file tells; a folder is a bag."""
+    suffixes = [BAG] if path.is_dir() else [s.lower() for s in path.suffixes if s.lower() != ".gz"]
     kind = suffixes[-1] if suffixes else ""
-    if kind not in KINDS:
+    if kind not in BY_ENDING:
+        plain = ", ".join(ending for ending, other in BY_ENDING.items() if other.packed)
+        bags = ", ".join(ending for ending, other in BY_ENDING.items() if not other.packed)
         raise InputError(
-            f"unknown kind of file {kind!r}; expected {', '.join(READERS)}, plain or with .gz, {', '.join(BAGS)} or the folder of a ROS 2 bag",
-            file=str(path),
+            f"unknown kind of file {kind!r}; expected {plain}, plain or with .gz, {bags} or the folder of a ROS 2 bag", file=str(path)
         )
-    return kind
+    return BY_ENDING[kind]

@@ -1,7 +1,7 @@
 """The fused C kernels of studies (kernels.c), compiled on first use: filters, decimation and least squares around the signals of a robot in C.
 
     FilteredStates(q, rate, signals, room)                  as runtime.observation.filters.filtered_states
-    Entries(model, names)                                   which signals stand where in the wanted columns
+    SignalEntries(model, names)                                   which signals stand where in the wanted columns
     decimated(entries, states, samples, ...)                kept samples of the wanted signals; the signals are not stored
 
 Least squares on these rows: `runtime.resolution.c.least_squares`.
@@ -183,7 +183,7 @@ class FilteredStates:
         return found
 
 
-class Entries:
+class SignalEntries:
     """Where the signals of a robot stand in the columns `names`: entry e of joint j is sign[e]*U[signal[e]], start[j] <= e < start[j + 1].
 
     columns : by joint, positions in `names` of its entries.   wanted : signals that occur, `number` their position in it, by entry.
@@ -228,7 +228,7 @@ def _matrices(p: Plan) -> tuple[Array, Array, Array, Array]:
 
 
 def decimated(
-    entries: Entries, states: FilteredStates, samples: slice, factor: int, settings: Decimate | None, constants: Array, room: Room
+    entries: SignalEntries, states: FilteredStates, samples: slice, factor: int, settings: Decimate | None, constants: Array, room: Room
 ) -> Array:
     """The kept samples of the wanted signals, shape (S, K): row i is signal entries.wanted[i].
 
@@ -255,7 +255,7 @@ def _blocks_together(L: int, tile: int) -> int:
     return min(range(1, max(1, TOGETHER // L) + 1), key=lambda k: (-k * L % tile) / (k * L))
 
 
-def _every_sample(entries: Entries, states: FilteredStates, samples: slice, constants: Array, room: Room) -> Array:
+def _every_sample(entries: SignalEntries, states: FilteredStates, samples: slice, constants: Array, room: Room) -> Array:
     """The wanted signals at all samples, shape (S, N)."""
     N, table = samples.stop - samples.start, entries.model.signals
     U, rows = room.array("U", table.count, N), states.rows(samples)

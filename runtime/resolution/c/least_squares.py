@@ -16,7 +16,7 @@ from scipy.linalg.lapack import dgeqrf
 from runtime.estimators.normal_equations import LIMIT, LeastSquares, Normal
 from runtime.estimators.solution import solve
 from runtime.observation.qr_factor import Factor, JointFactor, stacked
-from runtime.resolution.c.kernels import LANES, SIDE, SPAN, Entries, EntriesStructure, Room, RowsStructure, address, call
+from runtime.resolution.c.kernels import LANES, SIDE, SPAN, EntriesStructure, Room, RowsStructure, SignalEntries, address, call
 
 Array = np.ndarray
 
@@ -47,7 +47,7 @@ class KeptRows:
 
     Parameters
     ----------
-    entries : Entries
+    entries : SignalEntries
         Where the signals stand in W.
     parts : sequence of (y, Y, mask), one for each record
         Signals y, shape (S, K), as `kernels.decimated` gives them; torques Y, shape (n, K), N m (N); mask, bool, shape (n, K), of the rows used.
@@ -55,7 +55,7 @@ class KeptRows:
         Arrays that calls reuse.
     """
 
-    def __init__(self, entries: Entries, parts: Sequence[tuple[Array, Array, Array]], room: Room) -> None:
+    def __init__(self, entries: SignalEntries, parts: Sequence[tuple[Array, Array, Array]], room: Room) -> None:
         self.entries, self.room = entries, room
         self.counts = [len(C) + 1 for C in entries.columns]
         self.widths = [-(-count // SIDE) * SIDE for count in self.counts]

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.model.compile_cache import NotCompiledError
-from runtime.model.compiled import CompiledModel, Signals
+from runtime.model.compiled import CompiledModel, SignalTable
 from runtime.observation.filters import decimated, filtered_states
 from runtime.resolution.c import kernels as fused
 from runtime.resolution.c.least_squares import KeptRows, least_squares
@@ -39,7 +39,7 @@ def _agree() -> bool:
     q = np.cumsum(np.random.default_rng(3).normal(size=(N, 2)), axis=0)
     room, callback = fused.Room(), _SIGNALS(_signals)
     model = _model(cast(int, ctypes.cast(callback, ctypes.c_void_p).value))
-    entries = fused.Entries(model, model.BASE_PARAMETERS)
+    entries = fused.SignalEntries(model, model.BASE_PARAMETERS)
     expected = filtered_states(q, RATE, SETTINGS)
     states = fused.FilteredStates(q, RATE, SETTINGS, room)
     y = fused.decimated(entries, states, slice(0, N), 3, SETTINGS.decimate, np.zeros(1), room)
@@ -69,5 +69,5 @@ def _signals(m: int, q: Any, qd: Any, qdd: Any, stride: int, constants: Any, U: 
 def _model(address: int) -> CompiledModel:
     """Gamma_1 = q1 X_1 + X_2, Gamma_2 = -X_2 + q2 X_3."""
     column, row, signal = np.array([0, 1, 1, 2]), np.array([0, 0, 1, 1]), np.array([0, 2, 2, 1])
-    table = Signals(address, 3, 16, column, row, signal, np.array([1, 1, -1, 1]), signal == 2)
+    table = SignalTable(address, 3, 16, column, row, signal, np.array([1, 1, -1, 1]), signal == 2)
     return cast(CompiledModel, SimpleNamespace(NAME="check", JOINTS=(1, 2), BASE_PARAMETERS=("X1", "X2", "X3"), signals=table))

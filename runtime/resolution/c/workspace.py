@@ -38,7 +38,7 @@ class CompiledWorkspace:
     """What one thread keeps from run to run of one task."""
 
     def __init__(self, task: Task, model: CompiledModel) -> None:
-        self.task, self.compiled, self.entries = task, model, kernels.Entries(model, task.names)
+        self.task, self.compiled, self.entries = task, model, kernels.SignalEntries(model, task.names)
         self.constants = kernels.constant_values(model, task.constants)
         self.room = kernels.Room()
         self.records = [(record, np.asfortranarray(record.q), kernels.Room()) for record in task.records]

@@ -13,19 +13,12 @@ of an order at which the parameters that Table 6 leaves out are not seen.
 from __future__ import annotations
 
 from math import pi
+from typing import Any
 
 import numpy as np
 
-from runtime.model.generated import GeneratedModel
 from runtime.motion.reference import Reference
-from runtime.settings.study import (
-    CestacSettings,
-    Decimate,
-    Lowpass,
-    RecordSettings,
-    Signals,
-    Study,
-)
+from runtime.settings.study import CestacSettings, Decimate, Lowpass, RecordSettings, Signals, Study
 from symgen.demo.simulated_record import recorded
 
 Array = np.ndarray
@@ -56,7 +49,7 @@ def haptic_study(runs: int) -> Study:
     return Study(signals=Signals(median=1, lowpass=Lowpass(cutoff=CUTOFF), decimate=Decimate()), cestac=cestac)
 
 
-def haptic_record(model: GeneratedModel, duration: float = DURATION) -> tuple[bytes, RecordSettings]:
+def haptic_record(model: Any, duration: float = DURATION) -> tuple[bytes, RecordSettings]:
     """The record as a file of the motor side, and the settings that read it."""
     return recorded(model, motion(duration), SEED, rate=RATE, encoder=ENCODER, noise=NOISE)
 

@@ -1,0 +1,288 @@
+"""IPOPT on CasADi's functions: from a random start to a motion of small criterion within the limits.
+
+From each start, first -log det(W_w'W_w) is lowered, which is smooth and does not depend on the scale of a column, then the criterion itself.
+Condition numbers and largest deviations are followed by the smooth bounds
+
+    cond^2 <= (tr A^8 tr C^8)^(1/8),     max_i C_ii <= (sum_i C_ii^8)^(1/8),     A = W_w'W_w, C = A^-1.
+
+Limits hold at the points of the grid, with a margin. sign(qd) is tanh(qd/v0), but for the rate of the torque, which leaves dry friction out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.excitation.criteria import MotionLimits, Weights
+from runtime.model.casadi import SymbolicModel, load_symbolic
+from runtime.settings.excitation import ExcitationSettings
+from runtime.settings.families import Fourier
+from runtime.settings.trajectories import Motion, Part
+
+Array = np.ndarray
+
+SOFT = 1e-6  # violation of a constraint that IPOPT aims at, of its scale
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What every start needs; travels once to each process.
+
+    Attributes
+    ----------
+    path : str
+        File of the CasADi model.
+    settings : ExcitationSettings
+    weights : Weights
+    limits : MotionLimits
+    X : ndarray, shape (b,)
+        All base parameters, for torques.
+    smooth : ndarray, shape (b,), 0 or 1
+        0 for the parameters of dry friction.
+    """
+
+    path: str
+    settings: ExcitationSettings
+    weights: Weights
+    limits: MotionLimits
+    X: Array
+    smooth: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Result of one start.
+
+    Attributes
+    ----------
+    number : int
+    motion : dict
+        As a mapping.
+    criterion : float
+        Of the optimiser.
+    message : str
+        What the optimiser says at its end.
+    violation : float
+        Largest one of a constraint at the points of the grid, of its scale.
+    """
+
+    number: int
+    motion: dict[str, Any]
+    criterion: float
+    message: str
+    violation: float
+
+
+def one_start(problem: Problem, number: int) -> Start:
+    """The motion that IPOPT reaches from the random start `number`."""
+    rng = np.random.default_rng([problem.settings.seed, number])
+    guess = Motion(tuple(Part(family, _guess(problem, family, rng)) for family in problem.settings.families))
+    return improved(problem, number, guess)
+
+
+def improved(problem: Problem, number: int, guess: Motion) -> Start:
+    """The motion that IPOPT reaches from `guess`."""
+    settings, n = problem.settings, len(problem.weights.s)
+    symbolic = load_symbolic(problem.path)
+    p = [ca.MX.sym(f"p{k}", len(family.names), n) for k, family in enumerate(settings.families)]
+    q, qd, qdd = _states(settings, p)
+    A = _information(symbolic, settings, problem.weights, q, qd, qdd)
+    g, lower, upper = _constraints(symbolic, problem, p, q, qd, qdd)
+    least, most = (np.concatenate([np.tile(family.bounds()[k], n) for family in settings.families]) for k in (0, 1))
+    nlp = {"x": ca.vertcat(*(ca.vec(part) for part in p)), "g": g}
+    x = np.concatenate([part.p.ravel(order="F") for part in guess.parts])
+    reached = _minimised({**nlp, "f": _logdet(A)}, x, (least, most), (lower, upper), settings.iterations)
+    if settings.criterion != "logdet":
+        reached = _minimised({**nlp, "f": _spread(A, settings.criterion)}, reached[0], (least, most), (lower, upper), settings.iterations)
+    x, criterion, violation, message = reached
+    sizes = np.cumsum([part.p.size for part in guess.parts])[:-1]
+    parts = [
+        Part(part.family, values.reshape(part.p.shape, order="F")) for part, values in zip(guess.parts, np.split(x, sizes), strict=True)
+    ]
+    return Start(number, Motion(tuple(parts)).to_mapping(), criterion, message, violation)
+
+
+def _states(settings: ExcitationSettings, p: Sequence[Any]) -> tuple[Any, Any, Any]:
+    """q, qd, qdd at the points of the grid, part after part, shape (M, n)."""
+    parts = []
+    for family, coefficients in zip(settings.families, p, strict=True):
+        t = np.linspace(0.0, family.duration, max(3, round(family.duration * settings.grid) + 1))
+        joints = [family.joint(t, column, ca) for column in ca.horzsplit(coefficients)]
+        parts.append([ca.horzcat(*(joint[k] for joint in joints)) for k in range(3)])
+    q, qd, qdd = (ca.vertcat(*(part[k] for part in parts)) for k in range(3))
+    return q, qd, qdd
+
+
+def _information(symbolic: SymbolicModel, settings: ExcitationSettings, weights: Weights, q: Any, qd: Any, qdd: Any) -> Any:
+    """A = sum_j W_wj'W_wj over the grid, shape (c, c)."""
+    n, M = len(weights.s), q.shape[0]
+    inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
+    D = smoothed(symbolic.regressor, settings.smooth)(*inputs, *symbolic.CONSTANTS.values())
+    numbers = [list(symbolic.BASE_PARAMETERS).index(name) for name in weights.names]
+    weighted = ca.mtimes(ca.mtimes(ca.diag(1 / weights.s), D[:, numbers]), ca.diag(weights.size))
+    rows = [ca.Function("row", inputs, [weighted[j, :].T]).map(M)(q.T, qd.T, qdd.T) for j in range(n)]
+    return sum(ca.mtimes(row, row.T) for row in rows) / M
+
+
+def _logdet(A: Any) -> Any:
+    """-log det A by an expression of its Cholesky factor."""
+    S = ca.SX.sym("A", A.shape[0], A.shape[0])
+    R = ca.chol(S)
+    return ca.Function("logdet", [S], [-2 * ca.sum1(ca.log(ca.diag(R)))])(A)
+
+
+def _spread(A: Any, criterion: str) -> Any:
+    """Logarithm of the smooth bound of the criterion."""
+    C = ca.solve(A, ca.DM.eye(A.shape[0]), "qr")
+    if criterion == "sigma":
+        return ca.log(ca.sum1(ca.diag(C) ** 8)) / 8
+    A4, C4 = (ca.mtimes(x, x) for x in (ca.mtimes(A, A), ca.mtimes(C, C)))
+    return (ca.log(ca.sumsqr(A4)) + ca.log(ca.sumsqr(C4))) / 8
+
+
+def _constraints(symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q: Any, qd: Any, qdd: Any) -> tuple[Any, Array, Array]:
+    """g(p) with its bounds, each divided by its scale."""
+    settings, limits = problem.settings, problem.limits.of(problem.settings.margin)
+    M = q.shape[0]
+    rows: list[tuple[Any, Any, Any]] = []  # expression, lower, upper: (M, n) or (n,)
+    half = (limits.upper - limits.lower) / 2
+    rows.append(((q - _rows(limits.lower + half, M)) / _rows(half, M), -1.0, 1.0))
+    rows.append((qd / _rows(limits.qd, M), -1.0, 1.0))
+    rows.append((qdd / _rows(limits.qdd, M), -1.0, 1.0))
+    rows += _torques(symbolic, problem, limits, q, qd, qdd)
+    rows += _distances(symbolic, settings, q)
+    ends = []
+    for k, (family, coefficients) in enumerate(zip(settings.families, p, strict=True)):
+        begin, end = (_at(family, coefficients, t) for t in (0.0, family.duration))
+        if isinstance(family, Fourier):
+            rows += [(begin[1] / limits.qd, 0.0, 0.0), (begin[2] / limits.qdd, 0.0, 0.0)]
+        speed = getattr(family, "speed", None)
+        if speed is not None:
+            corners = [_at(family, coefficients, family.blend / 2 + family.travel * (i + 0.5))[1] for i in range(family.points - 1)]  # type: ignore[attr-defined]
+            rows += [(corner / speed, -1.0, 1.0) for corner in corners]
+        ends.append((begin[0], end[0]))
+        if k:
+            rows.append(((begin[0] - ends[k - 1][1]) / half, 0.0, 0.0))
+        elif settings.begin is not None:
+            rows.append(((begin[0] - np.array(settings.begin)) / half, 0.0, 0.0))
+    g = [ca.vec(expression) for expression, *_ in rows]
+    lower, upper = (np.concatenate([np.full(part.numel(), bound[k]) for part, (_, *bound) in zip(g, rows, strict=True)]) for k in (0, 1))
+    return ca.vertcat(*g), lower, upper
+
+
+def _torques(symbolic: SymbolicModel, problem: Problem, limits: MotionLimits, q: Any, qd: Any, qdd: Any) -> list[tuple[Any, float, float]]:
+    """Torques, their root mean squares and rates of change, where they are limited."""
+    settings = problem.settings
+    limited = np.isfinite(limits.tau)
+    if not (limited.any() or settings.torque_rms or settings.torque_rate):
+        return []
+    n, M = q.shape[1], q.shape[0]
+    inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
+    dynamics = smoothed(symbolic.inverse_dynamics, settings.smooth)
+
+    def torque(X: Array) -> Any:
+        function = ca.Function("torque", inputs, [dynamics(*inputs, X, *symbolic.CONSTANTS.values())])
+        return function.map(M)(q.T, qd.T, qdd.T).T
+
+    tau, share = torque(problem.X), 1 - settings.margin
+    rows: list[tuple[Any, float, float]] = [(tau[:, j] / limits.tau[j], -1.0, 1.0) for j in np.flatnonzero(limited).tolist()]
+    if settings.torque_rms:
+        rows.append((ca.sum1(tau**2).T / M / (share * np.array(settings.torque_rms)) ** 2, 0.0, 1.0))
+    if settings.torque_rate:
+        smooth = torque(problem.X * problem.smooth)
+        rows.append(((smooth[1:, :] - smooth[:-1, :]) * settings.grid / _rows(share * np.array(settings.torque_rate), M - 1), -1.0, 1.0))
+    return rows
+
+
+def _distances(symbolic: SymbolicModel, settings: ExcitationSettings, q: Any) -> list[tuple[Any, float, float]]:
+    """Squared distances of the spheres that stay apart, of the square of the smallest they may have."""
+    if not settings.pairs:
+        return []
+    n, M = q.shape[1], q.shape[0]
+    at = ca.SX.sym("q", n)
+    frame_poses: Any = getattr(symbolic, "frame_poses", None)
+    if frame_poses is None:
+        raise InputError("this casadi module has no frame_poses, which distances need; emit it again")
+    poses = dict(zip(frame_poses.name_out(), frame_poses(at, *symbolic.CONSTANTS.values()), strict=True))
+    unknown = [sphere.frame for sphere in settings.spheres if f"T{sphere.frame}" not in poses and sphere.frame != 0]
+    if unknown:
+        raise InputError(f"no frame {unknown[0]} that could carry a sphere; there are 0, {', '.join(name[1:] for name in poses)}")
+    poses["T0"] = ca.SX.eye(4)
+    centres = [ca.mtimes(poses[f"T{s.frame}"], ca.vertcat(*s.centre, 1.0))[:3] for s in settings.spheres]
+    smallest = [settings.spheres[a].radius + settings.spheres[b].radius + settings.gap for a, b in settings.pairs]
+    squares = [ca.sumsqr(centres[a] - centres[b]) / d**2 for (a, b), d in zip(settings.pairs, smallest, strict=True)]
+    return [(ca.Function("apart", [at], [ca.vertcat(*squares)]).map(M)(q.T), 1.0 + 2 * settings.margin, np.inf)]
+
+
+def _minimised(
+    nlp: dict[str, Any], guess: Array, range_of_x: tuple[Array, Array], range_of_g: tuple[Array, Array], iterations: int
+) -> tuple[Array, float, float, str]:
+    """x, criterion, largest violation of a constraint, and what IPOPT says."""
+    options: dict[str, Any] = {
+        "ipopt": {
+            "hessian_approximation": "limited-memory",
+            "limited_memory_max_history": 8,
+            "max_iter": iterations,
+            "print_level": 0,
+            "sb": "yes",
+            "tol": 1e-4,
+            "constr_viol_tol": SOFT,
+            "acceptable_tol": 1e-3,
+            "mu_strategy": "adaptive",
+        },
+        "print_time": False,
+        "error_on_fail": False,
+    }
+    solver = ca.nlpsol("excite", "ipopt", nlp, options)
+    end = solver(x0=guess, lbx=range_of_x[0], ubx=range_of_x[1], lbg=range_of_g[0], ubg=range_of_g[1])
+    g = np.asarray(end["g"]).ravel()
+    violation = float(np.max(np.maximum(range_of_g[0] - g, g - range_of_g[1]), initial=0.0))
+    criterion = float(end["f"])
+    x = np.asarray(end["x"]).ravel()
+    if not (np.isfinite(criterion) and np.isfinite(violation)):
+        return guess, float("inf"), float("inf"), solver.stats()["return_status"]
+    return x, criterion, violation, solver.stats()["return_status"]
+
+
+def smoothed(function: Any, v0: float) -> Any:
+    """The ca.Function of scalars with tanh(u/v0) in place of every sign(u)."""
+    inputs = function.sx_in()
+    columns = [ca.vertsplit(x) if x.numel() else [] for x in inputs]
+    results = [[0.0] * function.nnz_out(k) for k in range(function.n_out())]
+    w: list[Any] = [None] * function.sz_w()
+    for k in range(function.n_instructions()):
+        op, i, o = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
+        if op == ca.OP_CONST:
+            w[o[0]] = ca.SX(function.instruction_constant(k))
+        elif op == ca.OP_INPUT:
+            w[o[0]] = columns[i[0]][i[1]]
+        elif op == ca.OP_OUTPUT:
+            results[o[0]][o[1]] = w[i[0]]
+        elif op == ca.OP_SIGN:
+            w[o[0]] = ca.tanh(w[i[0]] / v0)
+        else:
+            w[o[0]] = ca.SX.unary(op, w[i[0]]) if len(i) == 1 else ca.SX.binary(op, w[i[0]], w[i[1]])
+    outputs = [ca.SX(function.sparsity_out(k), ca.vertcat(*x)) for k, x in enumerate(results)]
+    return ca.Function(f"{function.name()}_smooth", inputs, outputs)
+
+
+def _at(family: Any, p: Any, t: float) -> list[Any]:
+    """q, qd, qdd of all joints at one time, shape (n, 1)."""
+    joints = [family.joint(np.array([t]), column, ca) for column in ca.horzsplit(p)]
+    return [ca.vertcat(*(joint[k] for joint in joints)) for k in range(3)]
+
+
+def _guess(problem: Problem, family: Any, rng: np.random.Generator) -> Array:
+    limits = problem.limits
+    speed = np.minimum(limits.qd, 1e3)
+    return np.array([family.guess(rng, lo, up, v) for lo, up, v in zip(limits.lower, limits.upper, speed, strict=True)]).T
+
+
+def _rows(x: Array, M: int) -> Any:
+    """x, shape (n,), in each of M rows."""
+    return ca.DM(np.tile(x, (M, 1)))

@@ -1,0 +1,76 @@
+"""Everything that the records of a robot say about it: the identification, friction, physical consistency, encoder resolution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from runtime.errors import InputError
+from runtime.estimators.closed_loop import Simulator
+from runtime.identification.friction import friction_curves
+from runtime.identification.identification import feasibility_of, identify
+from runtime.identification.result import Identification
+from runtime.model.generated import GeneratedModel
+from runtime.records.provenance import origin
+from runtime.records.record import Record
+from runtime.records.stream import Stream
+from runtime.resolution.advisor import advise
+from runtime.resolution.cestac import cestac
+from runtime.settings.study import Study
+
+T = TypeVar("T")
+
+
+def assess(
+    model: GeneratedModel,
+    records: Record | Stream | Sequence[Record | Stream],
+    study: Study | None = None,
+    *,
+    encoder: Sequence[float] = (),
+    simulator: Simulator | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    progress: Callable[[str], None] = lambda part: None,
+) -> Identification:
+    """The identification with friction, physical consistency and encoder resolution, as far as records, study and installed extras allow.
+
+    Parameters
+    ----------
+    model, records, study, simulator, provenance : as for `identify`
+    encoder : sequence of float
+        Steps of the encoders in use, rad or m; judged like every other check.
+    progress : function of str
+        Called with the name of each part before it is computed.
+
+    Returns
+    -------
+    Identification
+        `missing` holds the parts that cannot be computed, each with its reason.
+    """
+    progress("identification")
+    result = identify(model, records, study, simulator=simulator, provenance=provenance)
+    if not result.determined:
+        reason = "friction, physical consistency, encoder resolution: the record does not determine the parameters"
+        return replace(result, missing=(reason,))
+    missing: list[str] = []
+
+    def attempt(part: str, compute: Callable[[], T]) -> T | None:
+        progress(part)
+        try:
+            return compute()
+        except InputError as e:  # an extra is missing, or the study does not suit the part
+            missing.append(f"{part}: {e}")
+            return None
+
+    if not result.feasible:
+        result = replace(result, feasibility=attempt("physical consistency", lambda: feasibility_of(result)))
+    whole = [record for record in result.records if isinstance(record, Record)]
+    if len(whole) < len(result.records):
+        missing.append("friction and encoder resolution: they need whole records; set stream: off")
+        return replace(result, missing=tuple(missing))
+    study, names, sources = result.study, result.essential.names, origin(whole)
+    columns = names if study.cestac.columns == "essential" else None
+    curves = attempt("friction", lambda: friction_curves(model, whole, study, result.estimate))
+    advice = attempt("resolution advice", lambda: advise(model, whole, study, columns=names, asked=tuple(encoder), provenance=sources))
+    resolution = attempt("resolution study", lambda: cestac(model, whole, study, columns=columns, provenance=sources))
+    return replace(result, friction=curves or (), advice=advice, resolution=resolution, missing=tuple(missing))

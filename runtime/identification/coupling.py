@@ -1,0 +1,60 @@
+"""What the coupling of the drives explains: the same records as if the drives were coupled in position and torque, in one of them, or in none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TypeAlias, overload
+
+import numpy as np
+
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import CLOSED_LOOP, estimate_of, linear_companion, point_estimate
+from runtime.model.drives import Coupling, Drives
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.records.record import Record
+from runtime.records.stream import ChangedStream, Stream
+from runtime.settings.study import Study
+
+Array = np.ndarray
+Observed: TypeAlias = Callable[[Sequence[Record | Stream]], Observation]
+
+COUPLINGS: tuple[Coupling, ...] = ("both", "position", "torque", "none")
+
+
+def coupling_fits(model: GeneratedModel, records: Sequence[Record | Stream], study: Study, observed: Observed) -> dict[Coupling, Estimate]:
+    """Estimates of all parameters by the coupling used; empty unless all records are of the motor side of coupled drives.
+
+    observed : the rows of records that were read with another coupling.
+    """
+    read_with = [settings.coupling for settings in study.record]
+    if len(records) != len(study.record):  # a record that was split at gaps, or records from elsewhere
+        read_with = [*set(read_with)] * len(records)
+    if model.DRIVES is None or any(settings.sides != ("motor", "motor") for settings in study.record) or len(read_with) != len(records):
+        return {}
+    drives = Drives.from_mapping(model.DRIVES)
+    if not (drives.ratio - np.diag(np.diag(drives.ratio))).any():
+        return {}
+    method = linear_companion(study.estimate) if study.estimate.method in CLOSED_LOOP else point_estimate(study.estimate)
+    fits: dict[Coupling, Estimate] = {}
+    for coupling in COUPLINGS:
+        changed = [recoupled(r, drives.decoupled(own), drives.decoupled(coupling)) for r, own in zip(records, read_with, strict=True)]
+        fits[coupling] = estimate_of(observed(changed), method, model=model)
+    return fits
+
+
+@overload
+def recoupled(record: Record, used: Drives, wanted: Drives) -> Record: ...
+@overload
+def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record | Stream: ...
+def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record | Stream:
+    """The record as the drives `wanted` would have turned its motor side into the joint side; `used` are those it was read with."""
+
+    def change(q: Array, tau: Array) -> tuple[Array, Array]:
+        return wanted.joint_position(used.motor_position(q)), wanted.joint_torque(used.motor_command(tau))
+
+    if not isinstance(record, Record):
+        return ChangedStream(record, change)
+    q, tau = change(record.q, record.tau)
+    return replace(record, q=q, tau=tau)

@@ -1,0 +1,285 @@
+"""What `identify` returns: the parameters of one robot, and everything that its records say about them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+from runtime.estimators.essential import Essential
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import LINEAR
+from runtime.estimators.physical import negative_elements
+from runtime.identification.checklist import Checklist, checklist_of, lost_joints
+from runtime.identification.friction import FrictionCurve
+from runtime.identification.payload_study import PayloadStudy
+from runtime.identification.record_errors import RecordError, record_errors
+from runtime.identification.uncertainty import Uncertainty
+from runtime.identification.validation import Comparison, CrossValidation, WeakDirections
+from runtime.json_documents import json_text
+from runtime.model.drives import Coupling
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import Observation
+from runtime.records.provenance import record_names
+from runtime.records.record import Record
+from runtime.records.stream import Stream
+from runtime.resolution.advice import Advice
+from runtime.resolution.result import Cestac
+from runtime.settings.study import Study
+from runtime.table import Table, notebook
+
+if TYPE_CHECKING:
+    from runtime.estimators.feasibility import Feasibility
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Parameters of one robot from one record or several.
+
+    Attributes
+    ----------
+    model : GeneratedModel
+    study : Study
+        Settings, complete; its files relative to the current folder.
+    records : tuple of Record or Stream
+        Joint side, SI.
+    observation : Observation
+        Y = W X + rho of all records.
+    estimate : Estimate
+        All parameters, by the method of the study.
+    essential : Essential
+        The essential parameters and the trail from all parameters to them; by the linear companion of a method that is not linear.
+    comparison : Comparison
+        Torques by joint beside W X of `model_estimate`.
+    validation : tuple of CrossValidation
+        One part of the data predicts the others: windows of the records first, then further records.
+    correlations : WeakDirections
+        Parameters that trade against each other.
+    coupling : mapping of Coupling to Estimate
+        All parameters with the off-diagonal part of the drives used for "both", "position", "torque" or "none"; empty where there is none.
+    uncertainty : Uncertainty
+        Deviations without independence, whiteness of the residuals, F-tests, sets by threshold.
+    payload : PayloadStudy or None
+        The load of study.payload.
+    feasibility : Feasibility or None
+        Whether a physical robot can have the parameters of `estimate`.
+    friction : tuple of FrictionCurve
+        Friction against velocity, one curve per joint; empty where it was not asked for.
+    advice : Advice or None
+        The coarsest encoders.
+    resolution : Cestac or None
+        The resolution study at the steps of study.cestac.
+    missing : tuple of str
+        Parts that were asked for and could not be done, each with its reason.
+    """
+
+    model: GeneratedModel
+    study: Study
+    records: tuple[Record | Stream, ...]
+    observation: Observation
+    estimate: Estimate
+    essential: Essential
+    comparison: Comparison
+    validation: tuple[CrossValidation, ...]
+    correlations: WeakDirections
+    coupling: Mapping[Coupling, Estimate]
+    uncertainty: Uncertainty
+    payload: PayloadStudy | None = None
+    feasibility: Feasibility | None = None
+    friction: tuple[FrictionCurve, ...] = ()
+    advice: Advice | None = None
+    resolution: Cestac | None = None
+    missing: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Names of the records."""
+        return ", ".join(record_names(self.records))
+
+    @property
+    def source(self) -> Literal["measured", "simulated"]:
+        """Where the data come from, as the provenance says."""
+        return "simulated" if self.estimate.provenance.get("simulated") else "measured"
+
+    @property
+    def determined(self) -> bool:
+        """Whether the records determine all parameters: full rank of W."""
+        return self.estimate.status != "rank-deficient"
+
+    @property
+    def model_columns(self) -> Literal["essential", "all"]:
+        """Which parameters stand for the robot: the essential ones, or all where the method of the study is not linear."""
+        return "essential" if self.study.estimate.method in LINEAR else "all"
+
+    @property
+    def model_estimate(self) -> Estimate:
+        """The estimate that stands for the robot: `essential.estimate`, or `estimate` where the method of the study is not linear."""
+        return self.essential.estimate if self.model_columns == "essential" else self.estimate
+
+    @property
+    def torque_unit(self) -> str:
+        """N of a robot whose joints are all prismatic by the units of its parameters, else N m."""
+        units = set(dict(getattr(self.model, "UNITS", {})).values())
+        return "N" if "N" in units and "N*m" not in units else "N m"
+
+    @cached_property
+    def record_errors(self) -> tuple[RecordError, ...]:
+        """Error of each record with the parameters that stand for the robot; empty where there is one record."""
+        names = record_names(self.records)
+        return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
+
+    @property
+    def time_stamps(self) -> tuple[str, ...]:
+        """What the time stamps of the records were like, those of one file once."""
+        texts = {(record.name.split(" (")[0], text): None for record in self.records if (text := getattr(record, "time", ""))}
+        return tuple(f"Time stamps of {name}: {text}." for name, text in texts)
+
+    @property
+    def prediction_error(self) -> float:
+        """Largest relative error, %, of `model_estimate` on the parts of the records that did not give it; nan where there are none."""
+        return max(self._prediction_errors(self.validation[:1]), default=float("nan"))
+
+    def _prediction_errors(self, validation: tuple[CrossValidation, ...]) -> list[float]:
+        predictions = (p for part in validation for p in part.predictions)
+        return [p.relative_error for p in predictions if not p.fitted and p.columns == self.model_columns]
+
+    @property
+    def compared_rows(self) -> int:
+        """Rows of the comparison, which holds the first instants alone of records that were read by blocks."""
+        return sum(len(joint.t) for joint in self.comparison)
+
+    @property
+    def negative(self) -> tuple[str, ...]:
+        """Motor inertias and frictions of `model_estimate` that are certainly below zero."""
+        return negative_elements(self.model, self.model_estimate)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the estimate was made under the conditions of a physical robot."""
+        return "standard" in self.estimate.details
+
+    @cached_property
+    def checklist(self) -> Checklist:
+        """Whether the values can be used, question by question."""
+        drawn = self.uncertainty.bootstrap
+        return checklist_of(
+            self.estimate,
+            self.model_estimate,
+            self.verdict,
+            bootstrap=dict(zip(drawn.names, drawn.drawn, strict=True)) if self.model_columns == "essential" else {},
+            prediction_error=max(self._prediction_errors(self.validation), default=float("nan")),
+            negative=self.negative if self.determined else (),
+            feasibility=self.feasibility,
+            advice=self.advice,
+        )
+
+    @property
+    def verdict(self) -> str:
+        """One sentence."""
+        if not self.determined:
+            names = "; ".join(", ".join(group) for group in self.estimate.groups)
+            return (
+                f"The record {self.name} does not determine {self.model.NAME}: rank {self.estimate.rank} for {len(self.estimate.names)} "
+                f"parameters, cannot be told apart: {names}."
+            )
+        fit = self.model_estimate
+        worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
+        by_joint = f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)" if self.observation.n > 1 else ""
+        return (
+            f"{len(fit.names)} of {len(self.estimate.names)} parameters carry the model of {self.model.NAME}: they leave {fit.relative_error:.1f} % "
+            f"of the torques of the record {self.name} unexplained{by_joint}, and {self.prediction_error:.1f} % of a part that the fit has not seen."
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to look at before the values are used, in sentences: signs that no drive has, lost joints, parameters that trade."""
+        signs = (
+            f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: a sign of the joint is wrong (ratio, torque constant or "
+            "column), or its coupling, unit or frame."
+        )
+        lost = lost_joints(self.estimate, self.model_estimate)
+        return (*([signs] if self.negative else []), *([f"{lost}."] if lost else []), *self.correlations.warnings)
+
+    def __str__(self) -> str:
+        return self.to_text()
+
+    def _repr_html_(self) -> str:
+        parameters, joints = (self.model_estimate if self.determined else self.estimate).tables()
+        return notebook([self.verdict, *self.warnings], parameters, joints)
+
+    def to_text(self) -> str:
+        """Parameters, trail, validation, parameters that trade, uncertainty, coupling, what was asked for besides, then the verdict."""
+        fit = self.model_estimate if self.determined else self.estimate
+        trade = [f"warning: {sentence}" for sentence in self.warnings] or [
+            f"no two parameters trade: no |correlation| above {self.correlations.threshold:g}"
+        ]
+        parts = [fit.to_table(), self.essential.to_table(), *(part.to_table() for part in self.validation)]
+        parts += ["\n".join([*self._record_lines(), *self.time_stamps]), "\n".join(trade), "\n".join(self._direction_lines())]
+        parts += [self.uncertainty.to_text(), "\n".join(self._coupling_lines())]
+        parts += [self.eigenvalue_table().to_text()] if self.feasible else []
+        parts += [] if self.feasibility is None else [f"The parameters are {self.feasibility.text}."]
+        parts += [] if self.payload is None else [self.payload.to_table()]
+        parts += [curve.to_table() for curve in self.friction]
+        parts += [] if self.advice is None else [self.advice.verdict]
+        parts += [] if self.resolution is None else [self.resolution.to_table()]
+        return "\n\n".join(part for part in (*parts, *self.missing, self.verdict) if part)
+
+    def eigenvalue_table(self) -> Table:
+        """Conditions of a physical robot with the smallest eigenvalue of each, of an estimate that was made under them."""
+        active, eigenvalues = self.estimate.details["active"], self.estimate.details["smallest_eigenvalues"]
+        rows = [(name, f"{value:.4e}", "at its limit" if name in active else "") for name, value in eigenvalues.items()]
+        return Table("Conditions of a physical robot", ("condition", "smallest eigenvalue", ""), rows)
+
+    def _record_lines(self) -> list[str]:
+        return [
+            f"error in {one.name}: {one.relative_error:.2f} % in total, per joint {_percents(one.per_joint)}" for one in self.record_errors
+        ]
+
+    def _direction_lines(self) -> list[str]:
+        lines = [f"{d.ratio:.1e}  " + " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items()) for d in self.correlations.directions]
+        return ["directions that W sees least (singular value over the largest, unit columns)", *lines]
+
+    def _coupling_lines(self) -> list[str]:
+        return [
+            f"coupling of the drives in {key}: {fit.relative_error:.2f} % in total, per joint "
+            + _percents(tuple(joint.relative_error for joint in fit.per_joint))
+            for key, fit in self.coupling.items()
+        ]
+
+    def to_json(self) -> str:
+        """estimate.json: the Estimate of all parameters, and beside it everything else that was computed."""
+        return json_text({**json.loads(self.estimate.to_json()), **self.summary()})
+
+    def summary(self) -> dict[str, Any]:
+        """What estimate.json holds beside the Estimate of all parameters."""
+        fit = self.essential.estimate
+        summary: dict[str, Any] = {
+            "essential": {
+                **self.essential.summary(),
+                "X": fit.X,
+                "sigma": fit.sigma,
+                "relative_sigma": fit.relative_sigma,
+                "sigma_corrected": fit.sigma_corrected,
+                "relative_error": fit.relative_error,
+                "per_joint": fit.per_joint,
+            },
+            "validation": [part.summary() for part in self.validation],
+            "weak_directions": {name: getattr(self.correlations, name) for name in ("threshold", "pairs", "groups", "directions")},
+            "warnings": self.warnings,
+            "trust": self.uncertainty.summary(),
+            "coupling": {key: {"relative_error": e.relative_error, "per_joint": e.per_joint} for key, e in self.coupling.items()},
+            **({"by_record": self.record_errors} if self.record_errors else {}),
+            "verdict": self.verdict,
+        }
+        if self.feasibility is not None:
+            blocking = [{"condition": name, "margin": margin} for name, margin in self.feasibility.blocking]
+            summary["feasibility"] = {"feasible": self.feasibility.feasible, "margin": self.feasibility.margin, "blocking": blocking}
+        if self.payload is not None:
+            summary |= self.payload.summary()
+        return {**summary, **({"friction": [curve.summary() for curve in self.friction]} if self.friction else {})}
+
+
+def _percents(errors: tuple[float, ...]) -> str:
+    return " ".join(f"{error:.2f}" for error in errors)

@@ -1,0 +1,169 @@
+"""A table whose file is read by a process of its own: damage that ends a library, or makes it take all time or memory, ends that process only.
+
+Requests go out as lines of JSON, one at a time: a method of `Table` and its arguments. Answers come back as a line of JSON, {"value": ...},
+{"error": {...}}, or {"arrays": [sizes]} ahead of so many .npy files of that many bytes, one line for every block; nothing is pickled.
+
+The limits, all of them here: MEMORY for every file and GROWTH times its size; SECONDS of processor time and one more for every
+BYTES_PER_SECOND, by request. `runtime.records.formats.child` sets them: the memory on Linux, the time and the size of files wherever POSIX is.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import weakref
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from io import BytesIO
+from tempfile import TemporaryDirectory
+from typing import IO, Any, cast
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.records.formats.columns import BLOCK, Array, Groups, Source, Table
+
+MEMORY = 400 * 2**20  # bytes beyond what the libraries take
+GROWTH = 6  # times the size of the file
+SECONDS = 3
+BYTES_PER_SECOND = 10**6
+
+START = "import sys; sys.path[:] = sys.argv[1:]; from runtime.records.formats.child import serve; serve()"
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS", "MALLOC_ARENA_MAX"), "1")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the process may use: memory and size of files in bytes, processor time of one request in s."""
+
+    memory: int
+    seconds: int
+
+    @classmethod
+    def of(cls, size: int) -> Limits:
+        """For a file of `size` bytes."""
+        return cls(MEMORY + GROWTH * size, SECONDS + size // BYTES_PER_SECOND)
+
+
+class Process:
+    """The other process: started, asked and ended. It ends with this object, and with the one that started it."""
+
+    def __init__(self, source: Source, limits: Limits) -> None:
+        folder = TemporaryDirectory(prefix="symgen-record-")  # of the other process, which may be ended before it can tidy up
+        self.popen = subprocess.Popen(
+            [sys.executable, "-P", "-c", START, *sys.path],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, **ONE_THREAD, "TMPDIR": folder.name},
+        )
+        self.end = weakref.finalize(self, _ended, self.popen, folder)
+        self.send([str(source.path.absolute()), source.topic, source.decimal, limits.memory, limits.seconds])
+
+    def send(self, request: Any) -> None:
+        """One line of JSON; where the process has ended, the answer that does not come tells."""
+        with suppress(BrokenPipeError):
+            cast(IO[bytes], self.popen.stdin).write(json.dumps(request).encode() + b"\n")
+            cast(IO[bytes], self.popen.stdin).flush()
+
+    def answer(self) -> Any:
+        """A value as {"value": ...}, a tuple of arrays, an error as {"error": ...}; None where the process has ended."""
+        pipe = cast(IO[bytes], self.popen.stdout)
+        line = pipe.readline()
+        answer = json.loads(line) if line.endswith(b"\n") else None
+        if answer is None or "arrays" not in answer:
+            return answer
+        files = [pipe.read(size) for size in answer["arrays"]]
+        if [len(data) for data in files] != answer["arrays"]:
+            return None
+        return tuple(np.load(BytesIO(data), allow_pickle=False) for data in files)
+
+
+@dataclass(eq=False, kw_only=True)
+class IsolatedTable(Table):
+    """Asks a process for everything. Blocks that are left unread end theirs; a request that comes between blocks has another.
+
+    Attributes
+    ----------
+    source : Source
+        The file.
+    title : str
+        What it should be.
+    idle : Process or None
+        One that waits for a request.
+    """
+
+    source: Source
+    title: str
+    idle: Process | None = field(default=None, init=False)
+
+    @classmethod
+    def start(cls, source: Source, title: str) -> IsolatedTable:
+        """The table of a file; InputError where the file cannot be opened."""
+        table = cls(file=source.file, size=source.size, source=source, title=title)
+        names, joints, table.topic = table._value("describe")
+        table.names, table.joints = tuple(names), None if joints is None else tuple(joints)
+        return table
+
+    def samples(self, groups: Groups) -> int:
+        return int(self._value("samples", groups))
+
+    def blocks(self, groups: Groups, size: int = BLOCK) -> Iterator[tuple[Array, ...]]:
+        return self._answers("blocks", groups, size)
+
+    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
+        return self.blocks([[name] for name in names], size)
+
+    def widths(self, groups: Groups) -> list[int]:
+        return cast(list[int], self._value("widths", groups))
+
+    def scalar(self, name: str) -> float:
+        return float(self._value("scalar", name))
+
+    def row(self, i: int) -> str:
+        return str(self._value("row", i))
+
+    def close(self) -> None:
+        """End the process."""
+        if self.idle is not None:
+            self.idle.end()
+        self.idle = None
+
+    def _value(self, call: str, *arguments: Any) -> Any:
+        (value,) = self._answers(call, *arguments)
+        return value
+
+    def _answers(self, call: str, *arguments: Any) -> Iterator[Any]:
+        """The value, or the blocks, of a request."""
+        process, self.idle = self.idle or Process(self.source, Limits.of(self.size)), None
+        try:
+            process.send([call, *arguments])
+            while isinstance(answer := process.answer(), tuple):
+                yield answer
+            if answer is None:
+                raise self._death(process.popen.wait())
+            self.idle = process
+            if "error" in answer:
+                raise InputError(**{"file": self.file, **answer["error"]})
+            if call != "blocks":
+                yield answer["value"]
+        finally:
+            if self.idle is not process:
+                process.end()
+
+    def _death(self, code: int) -> InputError:
+        seconds = Limits.of(self.size).seconds
+        if -code in (signal.SIGXCPU, signal.SIGKILL):
+            return InputError(f"takes more than {seconds} s of processor time to read; expected {self.title}", file=self.file)
+        end = signal.Signals(-code).name if code < 0 else f"code {code}"
+        return InputError(f"damaged, or not {self.title} (the library that reads it ends with {end}); write it again", file=self.file)
+
+
+def _ended(process: subprocess.Popen[bytes], folder: TemporaryDirectory[str]) -> None:
+    process.kill()
+    process.communicate()
+    folder.cleanup()

@@ -1,0 +1,47 @@
+"""What records and their files are called: names that differ where the records do, as short as they may be."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from runtime.records.formats.table import KINDS
+from runtime.settings.record import RecordSettings
+
+
+@dataclass(frozen=True)
+class Label:
+    """Name of a record, and of each of its files in the provenance of results."""
+
+    name: str
+    files: tuple[str, ...]
+
+
+def labels(settings: Sequence[RecordSettings]) -> list[Label]:
+    """One label by record, no name twice.
+
+    A record is called as its settings say, else as its dataset or its first file without ending; of equal ones each is called by the folder too
+    (day1/run, day2/run), by more folders where need be, and in the end by its number. A file is called by its name, by its path where another has
+    the same.
+    """
+    paths = [Path(s.dataset or "") / (s.files[0] if s.files else "") for s in settings]
+    parts = [[*path.parts[:-1], stem(path.name)] for path in paths]
+    names = [s.name or s.dataset or part[-1] for s, part in zip(settings, parts, strict=True)]
+    for depth in range(2, max(map(len, parts), default=0) + 1):
+        count = Counter(names)
+        names = [
+            "/".join(part[-depth:]) if count[name] > 1 and s.name is None else name
+            for s, part, name in zip(settings, parts, names, strict=True)
+        ]
+    names = [f"{name} ({names[:k].count(name) + 1})" if name in names[:k] else name for k, name in enumerate(names)]
+    same = Counter(Path(file).name for file in {file for s in settings for file in s.files})
+    files = [tuple(Path(file).name if same[Path(file).name] == 1 else file for file in s.files) for s in settings]
+    return [Label(name, of) for name, of in zip(names, files, strict=True)]
+
+
+def stem(file: str) -> str:
+    """The name of a measured file without its ending: log.1 of log.1.csv.gz."""
+    name = file[:-3] if file.lower().endswith(".gz") else file
+    return next((name[: -len(kind)] for kind in KINDS if name.lower().endswith(kind)), name) or file

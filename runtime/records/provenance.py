@@ -1,0 +1,33 @@
+"""Where results come from: the names of the records, their time stamps, and whether anything was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from runtime.records.record import Record
+from runtime.records.stream import Stream
+
+SIMULATED = "SIMULATED"
+"""First word of the name of a record that was not measured."""
+
+
+def record_names(records: Sequence[Record | Stream]) -> tuple[str, ...]:
+    """The name of each record, each name once: of equal ones the second is called "name (2)"."""
+    names: list[str] = []
+    for record in records:
+        name, k = record.name, 1
+        while name in names:
+            k += 1
+            name = f"{record.name} ({k})"
+        names.append(name)
+    return tuple(names)
+
+
+def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
+    """Provenance of a result on `records`: their names, whether one of them was simulated, and their time stamps in words."""
+    names = record_names(records)
+    simulated = any(record.name.startswith(SIMULATED) for record in records)
+    note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
+    stamps = {name: text for name, record in zip(names, records, strict=True) if (text := getattr(record, "time", ""))}
+    return {"records": list(names), "simulated": simulated, **({"time": stamps} if stamps else {}), **note}

@@ -1,0 +1,172 @@
+"""Results as files in a folder: the page, figures, tables, and everything that another program reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import singledispatch
+from pathlib import Path
+from typing import TypeAlias
+
+from runtime.excitation.search import Excitation
+from runtime.identification.fleet import Fleet
+from runtime.identification.result import Identification
+from runtime.json_documents import json_text
+from runtime.motion.result import Simulation
+from runtime.reporting import figures as plots
+from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays
+from runtime.reporting.excitation import excitation_page, motion_figure
+from runtime.reporting.friction import friction_figure
+from runtime.reporting.page import Section, render
+from runtime.reporting.pages import advice_page, identification_page, resolution_page
+from runtime.reporting.physical import standard_csv
+from runtime.reporting.resolution_advice import advice_figure
+from runtime.reporting.sections import parameters_csv
+from runtime.reporting.simulation import simulation_figure
+from runtime.resolution.advice import Advice
+from runtime.resolution.result import Cestac
+from runtime.result_files import Results, write_all
+from runtime.settings.location import study_text
+from runtime.settings.study import RecordSettings, Study
+from runtime.settings.yaml import yaml_text
+
+Files: TypeAlias = dict[str, str | bytes]
+
+RECORD = "simulated.csv"
+ONE_BLOCK = 40
+"""Lines of parameters.tex that one page holds; more stand in two blocks."""
+
+
+def report(
+    result: Identification | Cestac | Advice | Simulation | Excitation | Fleet, folder: str | Path | Results, *, study: Study | None = None
+) -> list[Path]:
+    """Write the page and the files of a result into a folder: all of them, or none.
+
+    Parameters
+    ----------
+    result : Identification, Cestac, Advice, Simulation, Excitation or Fleet
+    folder : str, Path or Results
+        Made where it is missing; or one that this process keeps for itself (`runtime.result_files.reserved`).
+    study : Study, optional
+        Settings of a Cestac, an Advice or a Simulation, for study.yaml; default: Study(). An Identification holds its own.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written, or another process writes there.
+    """
+    place = folder.folder if isinstance(folder, Results) else Path(folder)
+    files = files_of(result, place, study or Study())
+    return folder.write_all(files) if isinstance(folder, Results) else write_all(place, files)
+
+
+@singledispatch
+def files_of(result: object, folder: Path, study: Study) -> Files:
+    """Contents of `folder` by file name; TypeError for a result without files."""
+    raise TypeError(
+        f"{type(result).__name__} is no result that is written; expected an Identification, Cestac, Advice, Simulation, Excitation or Fleet"
+    )
+
+
+def identification_files(
+    result: Identification,
+    folder: Path,
+    *,
+    title: str = "",
+    warning: str = "",
+    verdict: str = "",
+    sections: Sequence[Section] = (),
+) -> Files:
+    """Files of an identification; title, warning, verdict, sections : as for `identification_page`."""
+    unit, fit, study = result.torque_unit, result.model_estimate, study_text(result.study, folder)
+    page = identification_page(result, study, title=title, warning=warning, verdict=verdict, sections=sections)
+    torques, residuals = plots.torque_overlay(result.comparison, unit, result.source), plots.residual_histogram(result.comparison, unit)
+    files: Files = {
+        "report.html": render(page),
+        "estimate.json": result.to_json(),
+        "parameters.csv": parameters_csv(result),
+        "parameters.tex": fit.to_latex(blocks=1 if len(fit.names) <= ONE_BLOCK else 2),
+        **array_files("estimate", estimate_arrays(result.estimate)),
+        "study.yaml": study,
+        "torques.png": plots.png(torques),
+        "torques.svg": plots.svg(torques),
+        "residuals.png": plots.png(residuals),
+    }
+    files |= {"standard_parameters.csv": standard_csv(result.estimate)} if result.feasible else {}
+    files |= {"friction.png": plots.png(friction_figure(result.friction, unit))} if result.friction else {}
+    files |= {} if result.advice is None else advice_files(result.advice)
+    return files | ({} if result.resolution is None else resolution_files(result.resolution))
+
+
+@files_of.register
+def _(result: Identification, folder: Path, study: Study) -> Files:
+    return identification_files(result, folder)
+
+
+@files_of.register
+def _(result: Cestac, folder: Path, study: Study) -> Files:
+    text = study_text(study, folder)
+    return {"report.html": render(resolution_page(result, text)), "study.yaml": text, **resolution_files(result)}
+
+
+@files_of.register
+def _(result: Advice, folder: Path, study: Study) -> Files:
+    text = study_text(study, folder)
+    return {"report.html": render(advice_page(result, text)), "study.yaml": text, **advice_files(result)}
+
+
+@files_of.register
+def _(result: Simulation, folder: Path, study: Study) -> Files:
+    """The record, a study that reads it back, figures of merit, the figure."""
+    figure = simulation_figure(result.model.JOINTS, result, result.units)
+    record = RecordSettings(files=(str(folder / RECORD),), rate=result.rate, name=result.name)
+    return {
+        RECORD: result.to_csv(),
+        "study.yaml": study_text(replace(study, record=(record,)), folder),
+        "simulation.json": json_text(result.summary()),
+        "simulation.svg": plots.svg(figure),
+        "simulation.png": plots.png(figure),
+    }
+
+
+@files_of.register
+def _(result: Excitation, folder: Path, study: Study) -> Files:
+    """The motion as samples and by its coefficients, its figures of merit, the figure."""
+    figure = motion_figure(result)
+    return {
+        "report.html": render(excitation_page(result, plots.svg(figure))),
+        "excitation.json": json_text(result.summary()),
+        "trajectory.csv": result.to_csv(),
+        "motion.yaml": yaml_text({"motion": result.motion.to_mapping()}),
+        "motion.png": plots.png(figure),
+    }
+
+
+@files_of.register
+def _(result: Fleet, folder: Path, study: Study) -> Files:
+    return {"summary.txt": f"{result}\n", "summary.csv": result.to_csv(), "summary.json": result.to_json()}
+
+
+def resolution_files(result: Cestac, *, curve: Cestac | None = None, names: Sequence[str] = ()) -> Files:
+    """The study in every format, and the figure where a position is perturbed.
+
+    curve : the study that the figure shows; default: `result`.   names : parameters drawn in colour.
+    """
+    files: Files = {"cestac.json": result.to_json(), "cestac.csv": cestac_csv(result), "cestac.tex": result.to_latex()}
+    files |= array_files("cestac", cestac_arrays(result))
+    shown = curve or result
+    if any(level.level.delta and not level.level.torque for level in shown.levels):
+        figure = plots.error_against_resolution(shown, names)
+        files |= {"resolution.png": plots.png(figure), "resolution.svg": plots.svg(figure)}
+    return files
+
+
+def advice_files(advice: Advice) -> Files:
+    """advice.json and the figure."""
+    figure = advice_figure(advice)
+    return {"advice.json": advice.to_json(), "advice.png": plots.png(figure), "advice.svg": plots.svg(figure)}

@@ -1,0 +1,60 @@
+"""A resolution study: its text, its sections and its page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from runtime.reporting import figures as plots
+from runtime.reporting.page import Image, Number, Section, State
+from runtime.resolution.result import Cestac
+
+
+def resolution_section(
+    result: Cestac, title: str = "Encoder resolution", *, curve: Cestac | None = None, names: Sequence[str] = ()
+) -> Section:
+    """Table 3 of the chapter with %e and %sigma, both readings of %e(rho), and the curve of %e against Delta."""
+    drawn = curve or result
+    several = sum(1 for r in drawn.levels if r.level.delta and not r.level.torque) > 0
+    image = (
+        Image(
+            "%e against resolution; dotted: the limits of the verdict, 1 % and 5 %; dashed: increase of the residual norm in % of |Y|; grey: the "
+            "other parameters that decide",
+            plots.svg(plots.error_against_resolution(drawn, names)),
+            "Change of the estimates in per cent against encoder resolution, logarithmic axes",
+        )
+        if several
+        else None
+    )
+    text = (
+        "Two verdicts stand below. The printed rule asks every parameter that decides, and %e(rho), to stay below 1 % (practically unbiased) and calls "
+        "5 % biased. The chapter's section 4.1.4 calls the residual the best single indicator, as it sees the whole model: the last verdict applies "
+        "the same limits to the increase of its norm alone.",
+        *(f"{r.level.label}: {r.message}" for r in result.levels),
+    )
+    return Section(title, text, [image] if image else [], [result.mean_table(), result.error_table(), result.residual_table()])
+
+
+def level_numbers(result: Cestac) -> list[Number]:
+    """The verdict of every step, for the head of a page."""
+    states: dict[str, State] = {"unbiased": "good", "doubtful": "doubtful", "biased": "no"}
+    return [Number(r.level.label, r.verdict, states[r.verdict]) for r in result.levels]
+
+
+def resolution_text(result: Cestac) -> str:
+    """Means and residuals as Table 3, then %e (%sigma), then the verdict in one sentence."""
+    return f"{result.to_table()}\n\n{resolution_verdict(result)}"
+
+
+def resolution_verdict(result: Cestac) -> str:
+    """The verdict of every step, in one sentence."""
+    by_verdict: dict[str, list[str]] = {}
+    for level in result.levels:
+        by_verdict.setdefault(level.verdict, []).append(level.level.label)
+    meaning = {"unbiased": "practically unbiased", "doubtful": "doubtful", "biased": "biased"}
+    parts = [f"{meaning[verdict]} at {', '.join(labels)}" for verdict, labels in by_verdict.items()]
+    worst = max(result.levels, key=lambda level: max(level.decided_by.values(), default=0.0), default=None)
+    if worst is None:
+        return "Nothing was perturbed."
+    name, error = next(iter(worst.decided_by.items()))
+    change = f"{'the residual' if name == 'rho' else name}, {error:.1f} % at {worst.level.label}"
+    return f"Least squares is {'; '.join(parts)}; largest change: {change}."

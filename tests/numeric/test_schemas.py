@@ -1,0 +1,94 @@
+"""Published JSON Schemas: made from the types, true of what is written, complete.
+
+After a change of a type or of its docstring: python tests/numeric/test_schemas.py writes them.
+"""
+
+import ast
+import json
+import re
+from pathlib import Path
+from typing import get_args
+
+import jsonschema
+import pytest
+
+import runtime
+from runtime.estimators.estimate import Status
+from runtime.identification.schemas import schemas
+from runtime.json_documents import KINDS, schema_text
+from runtime.records.datasets import DATASETS, dataset_study
+from runtime.settings.study import Study, study_from_mapping, to_mapping
+
+ROOM = Path(runtime.__file__).parent
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_published_schemas_are_those_of_the_types(kind):
+    assert schema_text(kind) == schemas()[kind], "run: python tests/numeric/test_schemas.py"
+    jsonschema.Draft202012Validator.check_schema(json.loads(schema_text(kind)))
+
+
+def test_every_kind_is_published():
+    assert set(KINDS) == set(schemas()) == {p.name.partition(".")[0] for p in (ROOM / "schemas").glob("*.json")}
+
+
+def statuses(tree):
+    """Texts that a module gives as the status of an Estimate: to the keyword or name `status`, or first in what a function returns as one."""
+    values = [node.value for node in ast.walk(tree) if isinstance(node, ast.keyword) and node.arg == "status"]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple | ast.Name):
+            first = node.targets[0].elts[0] if isinstance(node.targets[0], ast.Tuple) else node.targets[0]
+            values += [node.value] if isinstance(first, ast.Name) and first.id == "status" else []
+        if isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation) == "Status" and node.value:
+            values.append(node.value)
+        if isinstance(node, ast.FunctionDef) and node.returns and "Status" in ast.unparse(node.returns):
+            values += [n.value.elts[0] for n in ast.walk(node) if isinstance(n, ast.Return) and isinstance(n.value, ast.Tuple)]
+    words = {n.value for value in values for n in ast.walk(value) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+    return {word for word in words if re.fullmatch(r"[a-z]+(-[a-z]+)*", word)}
+
+
+def test_every_status_of_the_code_is_in_the_schema():
+    trees = [ast.parse(p.read_text(encoding="utf-8")) for p in (ROOM / "estimators").glob("*.py") if p.stem != "semidefinite"]
+    written = set().union(*map(statuses, trees))
+    known = json.loads(schema_text("estimate"))["properties"]["status"]["enum"]
+    assert written == set(known) == set(get_args(Status))
+
+
+@pytest.mark.parametrize("name", [None, *DATASETS])
+def test_studies_follow_their_schema(name):
+    schema = json.loads(schema_text("study"))
+    written = {} if name is None else dataset_study(name)
+    jsonschema.validate(written, schema)
+    jsonschema.validate(to_mapping(Study() if name is None else study_from_mapping(written)), schema)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"signals": {"median": 5.5}},
+        {"signals": {"lowpas": {}}},
+        {"signals": {"lowpass": {"cutoff": -1}}},
+        {"estimate": {"method": "magic"}},
+        {"cestac": {"runs": 1}},
+        {"rows": {"window": [0]}},
+        {"record": [{"side": "left"}]},
+        {"essential": {"threshold": 1}},
+    ],
+)
+def test_editors_see_what_the_reader_refuses(wrong):
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(wrong, json.loads(schema_text("study")))
+    with pytest.raises(runtime.InputError):
+        study_from_mapping(wrong)
+
+
+def test_editors_show_what_a_key_holds():
+    definitions = json.loads(schema_text("study"))["$defs"]
+    assert definitions["Lowpass"]["properties"]["cutoff"]["description"] == "Cutoff frequency. [Hz]"
+    for name, definition in definitions.items():
+        assert [key for key, value in definition["properties"].items() if "description" not in value] == [], name
+
+
+if __name__ == "__main__":
+    for kind, text in schemas().items():
+        (ROOM / "schemas" / f"{kind}.schema.json").write_text(text, encoding="utf-8")
