@@ -284,20 +284,30 @@ class Sample:
         return self.D.transpose(1, 0, 2).reshape(-1, self.D.shape[2])
 
 
+def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
+    """Largest coefficient of each actuated joint among the rows of elements that several joints share, at least 1; shape (n,)."""
+    shared = [row for e in robot.elements for row in e.along.values() if len(row) > 1]
+    return np.array([max([1.0, *(abs(row[j].value(constants)) for row in shared if j in row)]) for j in robot.joints])
+
+
 def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None) -> Sample:
     """The standard regressor at `states` random states: q within pi rad or 1 m, general loops within 0.5 of their start.
 
-    Velocities and accelerations are standard normal. Raises DescriptionError where the loops close in too few of the states.
+    Velocities and accelerations are standard normal; in every other state each velocity is divided by its leverage, so that the sign of
+    q4 + 101.25 q5 is not that of q5 alone. Raises DescriptionError where the loops close in too few of the states.
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
     start = {j: x for loop in robot.loops for j, x in loop.start.items()}
     free = not robot.loops or set(robot.passive) <= set(robot.constraints)
-    reach = np.array([np.pi if robot.frame(j).sigma == REVOLUTE and free else 1.0 if free else 0.5 for j in robot.joints])
+    longest = max([abs(e.value(model.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)], default=0.0)
+    slide = 1.0 if free else min(0.5, longest / 4)
+    reach = np.array([(np.pi if free else 0.5) if robot.frame(j).sigma == REVOLUTE else slide for j in robot.joints])
     centre = np.array([start.get(j, 0.0) for j in robot.joints])
-    n = len(robot.joints)
+    n, leverage = len(robot.joints), _leverage(robot, model.constants)
     state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
     for _ in range(DRAWS):
         q, qd, qdd = centre + reach * rng.uniform(-1, 1, (states, n)), *rng.standard_normal((2, states, n))
+        qd[::2] /= leverage
         block = model.actuated_regressor(q, qd, qdd)
         closed = np.isfinite(block).all(axis=(1, 2))
         D = np.concatenate([D, block[closed]])[:states]
@@ -328,6 +338,6 @@ def in_one_mode(robot: Robot) -> Robot:
     """
     closure = close(robot)
     if closure.tied:
-        return robot
+        return replace(robot, loops=tuple(replace(loop, start=dict(closure.start)) for loop in robot.loops))
     declared = {j: sum((g * Expression.symbol(f"q{i}") for i, g in closure.row[j].items()), closure.offset[j]) for j in robot.passive}
     return replace(robot, constraints=declared)

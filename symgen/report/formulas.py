@@ -66,7 +66,9 @@ def mapping(regrouping: Regrouping, certificate: Certificate, only: str | None =
         "count": len(regrouping),
         "standard_count": len(regrouping.robot.parameters),
         "method": regrouping.method,
-        "base_parameters": [{"name": b.name, **b.formula.mapping()} for b in selected(regrouping, only)],
+        "base_parameters": [
+            {"name": b.name, **b.formula.mapping()} for b in selected(regrouping, only)
+        ],
         "no_effect": list(regrouping.no_effect),
         "operations": operations(regrouping),
         "certificate": certificate.mapping(),
