@@ -21,7 +21,7 @@ Loop        frame 6 coincides with cut frame 5
 Loop        q5 = -q1 - q2 + q3 + q4
 Loop        q2, q4 from the closure equations by Newton; assembly mode of q1 = 2.2, q3 = 0.9, q2 = -1.464, q4 = 1.489
 
-Base parameters, 17 of 48; Gautier and Khalil (1990), recognised from 60-digit sampling
+Base parameters, 17 of 48; Gautier and Khalil (1990), exact over F_p
     ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4
     MX1R = MX1 + L1*M2 + L1/L4*MX4
     ZZ2R = ZZ2 + L2**2/L4*MX4

@@ -20,7 +20,7 @@ Loop        frame 5 coincides with cut frame 4
 Loop        q4 = -q1 - q2 + q3
 Loop        q2, q3 from the closure equations by Newton; assembly mode of q1 = 1, q2 = -0.5518, q3 = 1.296
 
-Base parameters, 11 of 34; Gautier and Khalil (1990), recognised from 60-digit sampling
+Base parameters, 11 of 34; Gautier and Khalil (1990), exact over F_p
     ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L3*MX3
     MX1R = MX1 + L1*M2 + L1/L3*MX3
     ZZ2R = ZZ2 + L2**2/L3*MX3
