@@ -5,13 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime import load_model
-from symgen import generate_module, load_robot
+import symgen
 from symgen.cli.main import app
 
 folder = Path(tempfile.mkdtemp())
-(folder / "planar_2r.py").write_text(generate_module(load_robot("planar_2r")))
-model = load_model(folder / "planar_2r.py")
+model = symgen.model("planar_2r")
 
 t = np.arange(0, 20, 0.005)
 w, a = np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]), np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]])
