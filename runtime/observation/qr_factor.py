@@ -128,9 +128,9 @@ class Factor:
 def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
     """The columns at the positions `kept` of the Factor, numbered in that order."""
     place = {int(column): position for position, column in enumerate(joint.columns)}
-    found = [(new, place[old]) for new, old in enumerate(kept) if old in place]
-    columns = np.array([new for new, _ in found], dtype=np.intp)
-    return replace(joint, columns=columns, R=joint.R[:, [*(position for _, position in found), joint.R.shape[1] - 1]])
+    places = [(new, place[old]) for new, old in enumerate(kept) if old in place]
+    columns = np.array([new for new, _ in places], dtype=np.intp)
+    return replace(joint, columns=columns, R=joint.R[:, [*(position for _, position in places), joint.R.shape[1] - 1]])
 
 
 def stacked(joints: Sequence[JointFactor], b: int) -> Array:
