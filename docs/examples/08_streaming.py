@@ -7,7 +7,7 @@ import numpy as np
 
 import runtime
 import symgen
-from runtime.records.reading_by_blocks import open_stream
+from runtime.records.reading_by_blocks import records_or_streams
 
 model = symgen.model("planar_2r")
 t = np.arange(0, 20, 0.002)
@@ -19,7 +19,7 @@ tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(model.VALUES)) + 
 log = Path(tempfile.mkdtemp()) / "log.csv"
 np.savetxt(log, np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
 
-study = runtime.Study(signals={"lowpass": {"cutoff": 20}})
-by_blocks = runtime.estimate(model, open_stream({"files": log}, model, block=1000), study)
+study = runtime.Study(record={"files": [str(log)]}, signals={"lowpass": {"cutoff": 20}}, stream=1000)  # blocks of 1000 samples
+by_blocks = runtime.estimate(model, records_or_streams(study.record, model, study.stream), study)
 at_once = runtime.estimate(model, runtime.read_record(log, model), study)
 print("largest difference, in sigma:", np.abs((by_blocks.X - at_once.X) / at_once.sigma).max())

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import symgen
-from symgen.cli.main import app
+from runtime.identification.fleet import identify_fleet
 
 folder = Path(tempfile.mkdtemp())
 model = symgen.model("planar_2r")
@@ -22,5 +22,6 @@ for number, mass in enumerate((2.0, 2.5, 3.0)):
     tau = model.inverse_dynamics(q, qd, qdd, X) + np.random.default_rng(number).normal(0, 0.2, q.shape)
     np.savetxt(folder / f"arm{number}.csv", np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
     jobs.append(f"  - {{name: arm {number}, robot: planar_2r, record: arm{number}.csv}}\n")
+jobs.append("  - {name: missing, robot: planar_2r, record: arm9.csv}\n")
 (folder / "fleet.yaml").write_text("symgen: 1\njobs:\n" + "".join(jobs))
-app(["fleet", str(folder / "fleet.yaml"), "-o", str(folder / "out")], standalone_mode=False)
+print(identify_fleet(folder / "fleet.yaml", load=symgen.model))
