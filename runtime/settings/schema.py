@@ -11,7 +11,6 @@ A number may be an arithmetic text (`2*pi/10000`), one value stands for a list o
 
 from __future__ import annotations
 
-from abc import ABCMeta
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, fields
 from numbers import Integral
@@ -113,7 +112,7 @@ Interval = Annotated[tuple[Real | None, Real | None], AfterValidator(_in_order)]
 """[t0, t1] in s; null leaves an end open."""
 
 
-class SettingsType(ABCMeta):
+class SettingsType(type):
     """Type of settings: values that pydantic refuses become a SettingsError, which names the key and what it expects."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
