@@ -23,8 +23,8 @@ from runtime.estimators import iv, ols
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.closed_loop import ClosedLoop, loop_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.fixed_point import Array, columns_of, full, initial
-from runtime.estimators.linear import assemble, outcome, standard_deviations
+from runtime.estimators.fixed_point import Array, full, initial
+from runtime.estimators.linear import assemble, columns_asked, outcome, standard_deviations
 from runtime.model.generated import GeneratedModel
 from runtime.observation.system import Observation, split_rows
 from runtime.settings.schema import Count, Positive, Real, Settings, structure
@@ -89,7 +89,7 @@ def cloe(
     SettingsError where no loop is attached to the observation.
     """
     loop, options = loop_of(observation, "cloe"), structure(CloeOptions, settings.options, ("estimate", "options"))
-    observation = columns_of(observation, settings)
+    observation = observation.columns(columns_asked(observation, settings))
     base = ols.system(observation, EstimateSettings())
     first = base.solve()
     if first.rank < len(observation.names):

@@ -18,8 +18,8 @@ from typing import Any
 from runtime.estimators import wls
 from runtime.estimators.closed_loop import Run, loop_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.fixed_point import Array, Step, columns_of, iterate, options_of, outcome_of, trail_of
-from runtime.estimators.linear import System, assemble, standard_deviations
+from runtime.estimators.fixed_point import Array, Step, iterate, options_of, outcome_of, trail_of
+from runtime.estimators.linear import System, assemble, columns_asked, standard_deviations
 from runtime.model.generated import GeneratedModel
 from runtime.observation.system import Observation
 from runtime.settings.study import EstimateSettings
@@ -34,7 +34,7 @@ def didim(
 ) -> Estimate:
     """The Estimate; `details`: trail of the passes, contraction. SettingsError where no loop is attached to the observation."""
     loop, options = loop_of(observation, "didim"), options_of(settings)
-    observation = columns_of(observation, settings)
+    observation = observation.columns(columns_asked(observation, settings))
 
     def update(runs: Sequence[Run], X: Array) -> Step:
         system = wls.system(loop.motion(runs, observation), EstimateSettings(method="wls"))

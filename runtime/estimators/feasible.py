@@ -32,7 +32,7 @@ from typing import Any, Literal
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.estimators import ols, wls
+from runtime.estimators import wls
 from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
@@ -94,7 +94,7 @@ def feasible(
         raise InputError("method feasible needs the model: it knows which parameters belong to one link")
     options = structure(FeasibleOptions, settings.options, ("estimate", "options"))
     physical = physical_model(model)
-    system = linear(observation, settings, options)
+    system = wls.least_squares(observation, settings, options.linear)
     free = system.solve()
     unconstrained = feasibility(physical, system.names, free.X, options)
     if unconstrained.feasible and unconstrained.margin >= options.margin and options.prior == "none":
@@ -134,13 +134,6 @@ def feasible(
         message += " The solver left a condition violated: try another margin, a prior, or bounds on the masses."
     scatter = bootstrapped(observation, system, physical, options, weight) if options.bootstrap else estimate.sigma_corrected
     return replace(estimate, message=message, details=details, sigma_corrected=scatter)
-
-
-def linear(observation: Observation, settings: EstimateSettings, options: FeasibleOptions) -> System:
-    """The rows as ols or wls weighs them."""
-    if settings.weights == "none":
-        return ols.system(observation, EstimateSettings("ols", "none", settings.columns, options.linear))
-    return wls.system(observation, EstimateSettings("wls", settings.weights, settings.columns, options.linear))
 
 
 def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> tuple[Array, float]:

@@ -89,18 +89,6 @@ def options_of(settings: EstimateSettings) -> FixedPointOptions:
     return structure(FixedPointOptions, settings.options, ("estimate", "options"))
 
 
-def columns_of(observation: Observation, settings: EstimateSettings) -> Observation:
-    """The columns that are estimated; the other parameters are zero."""
-    if settings.columns == "all":
-        return observation
-    unknown = [name for name in settings.columns if name not in observation.names]
-    if unknown:
-        raise SettingsError(
-            f"no parameter {', '.join(unknown)}; the model has {', '.join(observation.names)}", path=("estimate", "columns")
-        )
-    return observation.columns(settings.columns)
-
-
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
     """All base parameters (b,) from those of the columns `names`; the others are zero."""
     by_name = dict(zip(names, X, strict=True))

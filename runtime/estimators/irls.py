@@ -97,8 +97,7 @@ def irls(
     first = start.solve()
     if first.rank < len(start.names):
         return assemble(replace(start, settings=settings), first, model=model, provenance=provenance)
-    columns = [observation.names.index(name) for name in start.names]
-    W = observation.W[:, columns]
+    W = observation.columns(start.names).W
     fit = _iterated(observation, W, start.raw, first.X, "huber", options)
     if options.loss == "tukey":
         again = _iterated(observation, W, start.raw, fit.X, "tukey", options)

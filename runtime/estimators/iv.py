@@ -28,8 +28,8 @@ from runtime.estimators import ols, wls
 from runtime.estimators.block_covariance import deletions
 from runtime.estimators.closed_loop import Run, loop_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.fixed_point import Array, Step, columns_of, iterate, options_of, outcome_of, trail_of
-from runtime.estimators.linear import assemble, outcome
+from runtime.estimators.fixed_point import Array, Step, iterate, options_of, outcome_of, trail_of
+from runtime.estimators.linear import assemble, columns_asked, outcome
 from runtime.model.generated import GeneratedModel
 from runtime.observation.system import Observation, split_rows
 from runtime.settings.study import EstimateSettings
@@ -52,7 +52,7 @@ def iv(
     SettingsError where no loop is attached to the observation.
     """
     loop, options = loop_of(observation, "iv"), options_of(settings)
-    observation = columns_of(observation, settings)
+    observation = observation.columns(columns_asked(observation, settings))
     names = observation.names
     base = ols.system(observation, EstimateSettings())
     first = base.solve()
@@ -61,7 +61,7 @@ def iv(
 
     def update(runs: Sequence[Run], X: Array) -> Step:
         Z = loop.instruments(runs, observation).W
-        s = _scales(observation, X, base.raw)
+        s = wls.floored(base.raw, wls.common_scales(base.raw, X, len(X)))
         solution = _solved(observation, Z, s)
         norm = float(np.linalg.norm((observation.Y - observation.W @ solution[0]) / np.repeat(s, observation.rows)))
         return Step(solution[0], solution[1], norm, (Z, s, solution[2]))
@@ -112,13 +112,6 @@ def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
         statistic = float(np.sum(np.linalg.lstsq((U / sigma).T, d / sigma, rcond=None)[0] ** 2))
         statistics |= {"statistic": statistic, "probability": float(chi2.sf(statistic, len(d)))}
     return statistics
-
-
-def _scales(observation: Observation, X: Array, raw: Any) -> Array:
-    """s_j, shape (n,), of the residual of X."""
-    share = max(1 - len(X) / raw.rows, 1 / raw.rows)
-    s = np.array([joint.residual_norm(X) / np.sqrt(max(joint.rows, 1) * share) for joint in raw.joints])
-    return wls.floored(raw, s)
 
 
 def _solved(observation: Observation, Z: Array, s: Array) -> tuple[Array, Array, Array]:

@@ -29,10 +29,10 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from runtime.errors import SettingsError
-from runtime.estimators import ols, wls
+from runtime.estimators import wls
 from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.linear import System, assemble
+from runtime.estimators.linear import assemble
 from runtime.model.generated import GeneratedModel
 from runtime.observation.qr_factor import Array, triangularise
 from runtime.observation.system import Observation, split_rows
@@ -106,11 +106,13 @@ def tls(
 ) -> Estimate:
     """The Estimate by total least squares; `details` holds the exact and the noisy columns, t_j, s_min and |v_Y|."""
     options = tls_options(settings)
-    system = _linear(observation, settings, options)
+    if settings.weights == "covariance":
+        raise SettingsError("'covariance'; tls weighs joints, use none, joint or iterated", path=("estimate", "weights"))
+    system = wls.least_squares(observation, settings, {"block": options.block, "rank_tolerance": options.rank_tolerance})
     free = system.solve()
     if free.rank < len(system.names):
         return assemble(replace(system, settings=settings), free, model=model, provenance=provenance)
-    observation = observation if system.names == observation.names else observation.columns(system.names)
+    observation = observation.columns(system.names)
     split = split_columns(observation, options)
     if not len(split.noisy):
         estimate = assemble(replace(system, settings=settings), free, model=model, provenance=provenance)
@@ -242,17 +244,6 @@ def bootstrap_covariance(observation: Observation, split: Split, t: Array, optio
 def _rows(observation: Observation, split: Split, t: Array) -> Array:
     order = [*split.exact, *split.noisy]
     return np.asarray(np.column_stack([observation.W[:, order], observation.Y]) / np.repeat(t, observation.rows)[:, None])
-
-
-def _linear(observation: Observation, settings: EstimateSettings, options: TlsOptions) -> System:
-    """Least squares of the same rows, weighted as `weights` says."""
-    given = {"block": options.block, "rank_tolerance": options.rank_tolerance}
-    linear = {key: value for key, value in given.items() if value is not None}
-    if settings.weights == "covariance":
-        raise SettingsError("'covariance'; tls weighs joints, use none, joint or iterated", path=("estimate", "weights"))
-    if settings.weights == "none":
-        return ols.system(observation, replace(settings, method="ols", options=linear))
-    return wls.system(observation, replace(settings, method="wls", options=linear))
 
 
 def _details(observation: Observation, split: Split, t: Array, solved: Solved | None) -> dict[str, Any]:
