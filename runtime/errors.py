@@ -141,11 +141,8 @@ def _problem(error: Mapping[str, Any], given: Any) -> tuple[tuple[str | int, ...
     kind, context = error["type"], error.get("ctx", {})
     reason = f"{shown(error['input'])}; expected {EXPECTED.get(kind, '').format(**context)}"
     if kind == "missing":
-        reason = (
-            f"no key {error['loc'][-1]}; add it"
-            if isinstance(error["loc"][-1], str)
-            else f"{len(given)} values; expected at least {error['loc'][-1] + 1}"
-        )
+        key = error["loc"][-1]
+        reason = f"no key {key}; add it" if isinstance(key, str) else f"{len(given)} values; expected at least {key + 1}"
     elif kind == "too_long":
         reason = f"{context['actual_length']} values; expected {context['max_length']}"
     elif kind == "literal_error":

@@ -14,8 +14,8 @@ from symgen.errors import SymgenError
 
 if TYPE_CHECKING:
     from symgen.description import Robot, load_robot, packaged_robots, parse_robot
-    from symgen.emit.generate import generate_module
     from symgen.emit.certified import certify, model
+    from symgen.emit.generate import generate_module
     from symgen.regroup.certificate import Certificate
     from symgen.regroup.regrouping import BaseParameter, Regrouping
     from symgen.regroup.regrouping import regroup as regrouping

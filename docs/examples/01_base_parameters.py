@@ -1,9 +1,9 @@
 """Base parameters of a robot: what can be identified, and what each is made of."""
 
-from symgen import certify, load_robot, regrouping
+import symgen
 
-base = regrouping(load_robot("puma560"))
-print(f"{len(base)} of {len(base.robot.parameters)} parameters can be identified; proved: {certify(base).valid}")
+base = symgen.regrouping(symgen.load_robot("puma560"))
+print(f"{len(base)} of {len(base.robot.parameters)} parameters can be identified; proved: {symgen.certify(base).valid}")
 for parameter in base.base:
     if parameter.name != parameter.own:  # it absorbs others
         print(f"{parameter.name:6} = {parameter.formula}")

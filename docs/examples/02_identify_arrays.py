@@ -1,18 +1,11 @@
 """Identification of arrays: no file, no command, only positions and torques in memory."""
 
-import tempfile
-from pathlib import Path
-
 import numpy as np
 
-from runtime import Record, load_model, observe
-from runtime.estimators.methods import estimate_of
-from runtime.settings.study import study_from_mapping
-from symgen import generate_module, load_robot
+import runtime
+import symgen
 
-module = Path(tempfile.mkdtemp()) / "planar_2r.py"
-module.write_text(generate_module(load_robot("planar_2r")))
-model = load_model(module)
+model = symgen.model("planar_2r")  # or a robot file: arm.yaml, arm.urdf
 
 # A measurement: here computed from the values of the robot file, with torque noise.
 t = np.arange(0, 20, 0.002)
@@ -23,8 +16,9 @@ qd, qdd = (a * w * np.cos(phase)).sum(axis=1), (-a * w**2 * np.sin(phase)).sum(a
 truth = model.base_parameters(model.VALUES)
 tau = model.inverse_dynamics(q, qd, qdd, truth) + np.random.default_rng(0).normal(0, 0.2, q.shape)
 
-record = Record(t, q, tau, rate=500.0)
-study = study_from_mapping({"signals": {"lowpass": {"cutoff": 20}}})
-found = estimate_of(observe(model, record, study), study.estimate, model=model)
+record = runtime.Record(t, q, tau)
+result = runtime.identify(model, record, runtime.Study(signals={"lowpass": {"cutoff": 20}}))
+print(result.verdict)
+found = result.estimate
 for name, x, sigma, true in zip(found.names, found.X, found.sigma_corrected, truth, strict=True):
     print(f"{name:8} {x:9.4f} +- {sigma:.4f}   truth {true:9.4f}")

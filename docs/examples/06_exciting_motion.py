@@ -2,11 +2,10 @@
 
 import runtime
 import symgen
-from runtime.settings.study import study_from_mapping
 
 model, casadi = symgen.model("planar_2r"), symgen.model("planar_2r", target="casadi")
 parts = [{"family": "fourier", "period": 5, "harmonics": 3}]
-study = study_from_mapping({"excitation": {"parts": parts, "starts": 2, "iterations": 50, "rate": 200}})
+study = runtime.Study(excitation={"parts": parts, "starts": 2, "iterations": 50, "rate": 200})
 result = runtime.excite(model, study=study, symbolic=casadi)
 print(result)
 t, q, qd, qdd, tau = result.sampled()

@@ -1,19 +1,11 @@
 """The CasADi target: models as functions with derivatives, here the exact derivative of the torques by position."""
 
-import tempfile
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 
-from runtime.model.casadi import load_symbolic
-from symgen import load_robot
-from symgen.emit.generate import generate_files
+import symgen
 
-folder = Path(tempfile.mkdtemp())
-for name, text in generate_files(load_robot("planar_2r"), targets=("casadi",)).items():
-    (folder / name).write_text(text)
-arm = load_symbolic(folder / "planar_2r_casadi.py")
+arm = symgen.model("planar_2r", target="casadi")
 
 q, qd, qdd, X = (ca.SX.sym(name, n) for name, n in (("q", 2), ("qd", 2), ("qdd", 2), ("X", len(arm.BASE_PARAMETERS))))
 tau = arm.inverse_dynamics(q, qd, qdd, X, *arm.CONSTANTS.values())

@@ -5,13 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime import load_model
-from symgen import generate_module, load_robot
-from symgen.cli.main import app
+import symgen
+from runtime.identification.fleet import identify_fleet
 
 folder = Path(tempfile.mkdtemp())
-(folder / "planar_2r.py").write_text(generate_module(load_robot("planar_2r")))
-model = load_model(folder / "planar_2r.py")
+model = symgen.model("planar_2r")
 
 t = np.arange(0, 20, 0.005)
 w, a = np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]), np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]])
@@ -24,5 +22,6 @@ for number, mass in enumerate((2.0, 2.5, 3.0)):
     tau = model.inverse_dynamics(q, qd, qdd, X) + np.random.default_rng(number).normal(0, 0.2, q.shape)
     np.savetxt(folder / f"arm{number}.csv", np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
     jobs.append(f"  - {{name: arm {number}, robot: planar_2r, record: arm{number}.csv}}\n")
+jobs.append("  - {name: missing, robot: planar_2r, record: arm9.csv}\n")
 (folder / "fleet.yaml").write_text("symgen: 1\njobs:\n" + "".join(jobs))
-app(["fleet", str(folder / "fleet.yaml"), "-o", str(folder / "out")], standalone_mode=False)
+print(identify_fleet(folder / "fleet.yaml", load=symgen.model))

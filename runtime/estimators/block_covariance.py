@@ -45,7 +45,7 @@ def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
 def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array:
     """sqrt((K - 1)/K) into (1 - G_k)^-1 T'g_k of every block, shape (K, b); into, shape (b, rank): T for least squares."""
     size = np.linalg.norm(into, axis=1, keepdims=True)
-    found = []
+    changes = []
     for rows in blocks:
         P = rows[:, :-1] @ T
         share, V = np.linalg.eigh(P.T @ P)
@@ -54,8 +54,8 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
         s = V.T @ (P.T @ (rows[:, -1] - rows[:, :-1] @ X))
         u = directions[:, others] @ (s[others] / (1 - share[others]))
         u[(np.abs(directions[:, ~others]) > PARTICIPATION * size).any(axis=1)] = np.nan
-        found.append(u)
-    return np.asarray(np.sqrt(1 - 1 / max(len(found), 1)) * np.array(found).reshape(-1, len(into)))
+        changes.append(u)
+    return np.asarray(np.sqrt(1 - 1 / max(len(changes), 1)) * np.array(changes).reshape(-1, len(into)))
 
 
 def drawn_again(blocks: Iterable[Array], estimator: Callable[[Array], Array], runs: int, seed: int) -> Array:

@@ -23,8 +23,8 @@ from runtime.estimators import iv, ols
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.closed_loop import ClosedLoop, loop_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.fixed_point import Array, columns_of, full, initial
-from runtime.estimators.linear import assemble, outcome, standard_deviations
+from runtime.estimators.fixed_point import Array, full, initial
+from runtime.estimators.linear import assemble, columns_asked, outcome, standard_deviations
 from runtime.model.generated import GeneratedModel
 from runtime.observation.system import Observation, split_rows
 from runtime.settings.schema import Count, Positive, Real, Settings, structure
@@ -89,28 +89,30 @@ def cloe(
     SettingsError where no loop is attached to the observation.
     """
     loop, options = loop_of(observation, "cloe"), structure(CloeOptions, settings.options, ("estimate", "options"))
-    seen = columns_of(observation, settings)
-    base = ols.system(seen, EstimateSettings())
+    observation = observation.columns(columns_asked(observation, settings))
+    base = ols.system(observation, EstimateSettings())
     first = base.solve()
-    if first.rank < len(seen.names):
+    if first.rank < len(observation.names):
         return assemble(replace(base, settings=settings), first, model=model, provenance=provenance)
-    X = _start(loop, seen, options)
+    X = _start(loop, observation, options)
     D = np.maximum(np.abs(X), np.sqrt(np.diag(standard_deviations(base, first)[1])))
-    y = _measured(loop, seen, options.output)
+    y = _measured(loop, observation, options.output)
     trail: list[dict[str, Any]] = []
-    point = _at(loop, seen, X, y, options.output)
+    point = _at(loop, observation, X, y, options.output)
     converged = True
     for _ in range(2):
-        weights = 1 / np.repeat(_deviations(point.e, seen), seen.rows)
-        point, converged = _searched(loop, seen, point, y, D, weights, options, trail)
-    point = _at(loop, seen, point.X, y, options.output, slope=True)
+        weights = 1 / np.repeat(_deviations(point.e, observation), observation.rows)
+        point, converged = _searched(loop, observation, point, y, D, weights, options, trail)
+    point = _at(loop, observation, point.X, y, options.output, slope=True)
     assert point.J is not None
-    weights = 1 / np.repeat(_deviations(point.e, seen), seen.rows)
+    weights = 1 / np.repeat(_deviations(point.e, observation), observation.rows)
     T = np.linalg.inv(np.linalg.qr(point.J * weights[:, None] * D, mode="r")) * D[:, None]
     r, c = point.J.shape
     C = T @ T.T * point.criterion(weights) / max(r - c, 1)
-    C_b = block_covariance(split_rows(np.column_stack([point.J, point.e]) * weights[:, None], seen.blocks()), np.zeros(c), T)
-    found = assemble(replace(base, settings=settings, iterations=len(trail)), replace(first, X=point.X), model=model, provenance=provenance)
+    C_b = block_covariance(split_rows(np.column_stack([point.J, point.e]) * weights[:, None], observation.blocks()), np.zeros(c), T)
+    estimate = assemble(
+        replace(base, settings=settings, iterations=len(trail)), replace(first, X=point.X), model=model, provenance=provenance
+    )
     status, message = outcome(base, first)
     parts = [message, loop.assumption]
     if not converged:
@@ -119,47 +121,54 @@ def cloe(
             f"The search has not converged after {len(trail)} steps. Output error depends on its start: start from iv, raise passes, or take didim."
         )
     return replace(
-        found,
+        estimate,
         covariance=C,
         sigma=np.sqrt(np.diag(C)),
         sigma_corrected=np.sqrt(np.diag(C_b)),
         status=status,
         message=" ".join(part for part in parts if part),
-        details={"output": options.output, "output_error": _relative(point.e, y, seen), "trail": trail},
+        details={"output": options.output, "output_error": _relative(point.e, y, observation), "trail": trail},
     )
 
 
-def _start(loop: ClosedLoop, seen: Observation, options: CloeOptions) -> Array:
+def _start(loop: ClosedLoop, observation: Observation, options: CloeOptions) -> Array:
     if options.start != "iv":
-        return initial(loop, seen, options.start)
-    return iv.iv(seen, EstimateSettings(method="iv"), model=loop.model).X
+        return initial(loop, observation, options.start)
+    return iv.iv(observation, EstimateSettings(method="iv"), model=loop.model).X
 
 
-def _measured(loop: ClosedLoop, seen: Observation, output: str) -> Array:
+def _measured(loop: ClosedLoop, observation: Observation, output: str) -> Array:
     """y, shape (r,)."""
-    return loop.outputs([part.record.q for part in loop.parts], seen) if output == "position" else seen.Y
+    return loop.outputs([part.record.q for part in loop.parts], observation) if output == "position" else observation.Y
 
 
-def _at(loop: ClosedLoop, seen: Observation, X: Array, y: Array, output: str, *, slope: bool = False) -> Point:
+def _at(loop: ClosedLoop, observation: Observation, X: Array, y: Array, output: str, *, slope: bool = False) -> Point:
     """The residual at X, and its slope."""
-    every = full(seen.names, X, loop.model.BASE_PARAMETERS)
+    every = full(observation.names, X, loop.model.BASE_PARAMETERS)
     label = "q" if output == "position" else "tau"
     if not slope:
-        return Point(X, y - loop.outputs([getattr(run, label) for run in loop.run(every)], seen))
+        return Point(X, y - loop.outputs([getattr(run, label) for run in loop.run(every)], observation))
     runs = loop.sensitivity(every)
-    numbers = [loop.model.BASE_PARAMETERS.index(name) for name in seen.names]
-    e = y - loop.outputs([getattr(run, label) for run, _ in runs], seen)
-    return Point(X, e, loop.outputs([getattr(tangent, label)[:, :, numbers] for _, tangent in runs], seen))
+    numbers = [loop.model.BASE_PARAMETERS.index(name) for name in observation.names]
+    e = y - loop.outputs([getattr(run, label) for run, _ in runs], observation)
+    return Point(X, e, loop.outputs([getattr(tangent, label)[:, :, numbers] for _, tangent in runs], observation))
 
 
 def _searched(
-    loop: ClosedLoop, seen: Observation, point: Point, y: Array, D: Array, weights: Array, options: CloeOptions, trail: list[dict[str, Any]]
+    loop: ClosedLoop,
+    observation: Observation,
+    point: Point,
+    y: Array,
+    D: Array,
+    weights: Array,
+    options: CloeOptions,
+    trail: list[dict[str, Any]],
 ) -> tuple[Point, bool]:
     """Levenberg's steps down to a minimum of the weighted criterion."""
     damping = DAMPING
     for _ in range(options.passes):
         if point.J is None:
-            point = _at(loop, seen, point.X, y, options.output, slope=True)
+            point = _at(loop, observation, point.X, y, options.output, slope=True)
         assert point.J is not None
         A = point.J * weights[:, None] * D
         before = point.criterion(weights)
@@ -167,7 +176,7 @@ def _searched(
         damped = np.vstack([A, np.sqrt(damping) * size * np.eye(A.shape[1])])
         d = np.linalg.lstsq(damped, np.concatenate([point.e * weights, np.zeros(A.shape[1])]), rcond=None)[0]
         try:
-            tried = _at(loop, seen, point.X + D * d, y, options.output)
+            tried = _at(loop, observation, point.X + D * d, y, options.output)
             after = tried.criterion(weights)
         except InputError:  # no loop with these parameters: a smaller step
             after = np.inf
@@ -183,12 +192,16 @@ def _searched(
     return point, False
 
 
-def _deviations(e: Array, seen: Observation) -> Array:
+def _deviations(e: Array, observation: Observation) -> Array:
     """Root mean square of the residual of each joint, shape (n,), never zero."""
-    s = np.array([np.sqrt(np.mean(e[seen.joint(j)] ** 2)) if seen.rows[j] else 0.0 for j in range(seen.n)])
+    s = np.array([np.sqrt(np.mean(e[observation.joint(j)] ** 2)) if observation.rows[j] else 0.0 for j in range(observation.n)])
     return np.asarray(np.maximum(s, 1e-9 * max(float(s.max()), 1e-12)))
 
 
-def _relative(e: Array, y: Array, seen: Observation) -> list[float]:
+def _relative(e: Array, y: Array, observation: Observation) -> list[float]:
     """100 ||y - y_s||/||y|| by joint."""
-    return [100 * float(np.linalg.norm(e[seen.joint(j)]) / np.linalg.norm(y[seen.joint(j)])) for j in range(seen.n) if seen.rows[j]]
+    return [
+        100 * float(np.linalg.norm(e[observation.joint(j)]) / np.linalg.norm(y[observation.joint(j)]))
+        for j in range(observation.n)
+        if observation.rows[j]
+    ]

@@ -1,10 +1,10 @@
 """The closed loop in which a record was made, run again with other parameters: what IV, DIDIM and CLOE compare the record with.
 
     loop = closed_loop(model, records, study, simulator)
-    seen = loop.measured()                Y = W X + rho, to which the loop stays attached
+    observation = loop.measured()                Y = W X + rho, to which the loop stays attached
     runs = loop.run(X, g)                 one simulation per record, exact states, no noise, no steps
-    loop.instruments(runs, seen)          Z = F_p[W(q_s, ...)], q_s through the filters of the record                   IDIM-IV
-    loop.motion(runs, seen)               Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the decimation alone       DIDIM
+    loop.instruments(runs, observation)          Z = F_p[W(q_s, ...)], q_s through the filters of the record                   IDIM-IV
+    loop.motion(runs, observation)               Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the decimation alone       DIDIM
 
 g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies all that stands between position error and torque: the bandwidth
 of the simulated loop stays that of the real one while X^k is far from the truth. Rows are chosen by the velocity of the reference, never by that
@@ -106,31 +106,31 @@ class ClosedLoop:
 
     def measured(self) -> Observation:
         """Y = W X + rho of the measured positions on the rows of the loop, which it carries along."""
-        seen = self._observed([filtered_states(p.record.q, p.record.rate, p.selection.signals) for p in self.parts])
-        return replace(seen, closed_loop=LoopRows(self, np.arange(len(seen.Y))))
+        observation = self._observed([filtered_states(p.record.q, p.record.rate, p.selection.signals) for p in self.parts])
+        return replace(observation, closed_loop=LoopRows(self, np.arange(len(observation.Y))))
 
-    def instruments(self, runs: Sequence[Run], seen: Observation) -> Observation:
-        """The rows and columns of `seen` with Z of the simulated positions, through the filters of the record, in place of W."""
+    def instruments(self, runs: Sequence[Run], observation: Observation) -> Observation:
+        """The rows and columns of `observation` with Z of the simulated positions, through the filters of the record, in place of W."""
         pairs = zip(runs, self.parts, strict=True)
-        return self._like(seen, [filtered_states(run.q[: len(p.record)], p.record.rate, p.selection.signals) for run, p in pairs])
+        return self._like(observation, [filtered_states(run.q[: len(p.record)], p.record.rate, p.selection.signals) for run, p in pairs])
 
-    def motion(self, runs: Sequence[Run], seen: Observation) -> Observation:
-        """The rows and columns of `seen` with Z of the exact simulated states in place of W."""
+    def motion(self, runs: Sequence[Run], observation: Observation) -> Observation:
+        """The rows and columns of `observation` with Z of the exact simulated states in place of W."""
         sizes = [len(part.record) for part in self.parts]
-        return self._like(seen, [States(run.q[:N], run.qd[:N], run.qdd[:N]) for run, N in zip(runs, sizes, strict=True)])
+        return self._like(observation, [States(run.q[:N], run.qd[:N], run.qdd[:N]) for run, N in zip(runs, sizes, strict=True)])
 
     def sensitivity(self, X: Array) -> list[tuple[Run, Any]]:
         """One simulation per record, with its derivatives by X."""
         return [self.simulator.sensitivity(X, part.reference, start=part.record.q[0]) for part in self.parts]
 
-    def outputs(self, signals: Sequence[Array], seen: Observation) -> Array:
-        """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of `seen`: shape (r,) or (r, c)."""
-        assert seen.closed_loop is not None
+    def outputs(self, signals: Sequence[Array], observation: Observation) -> Array:
+        """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of `observation`: shape (r,) or (r, c)."""
+        assert observation.closed_loop is not None
         by_joint: list[Array] = []
         kept = [self._decimated(x, part) for x, part in zip(signals, self.parts, strict=True)]
         for j in range(len(self.model.JOINTS)):
             by_joint += [x[j][..., part.selection.mask[j]].T for x, part in zip(kept, self.parts, strict=True)]
-        return np.asarray(np.concatenate(by_joint)[seen.closed_loop.rows])
+        return np.asarray(np.concatenate(by_joint)[observation.closed_loop.rows])
 
     def _decimated(self, x: Array, part: LoopPart) -> Array:
         """(N, n, ...) to (n, ..., K)."""
@@ -143,17 +143,17 @@ class ClosedLoop:
         q = np.concatenate([part.reference.q[:: max(1, len(part.reference) // 500)] for part in self.parts])
         return np.asarray(np.einsum("tjj->j", functions.inertia_matrix(q, X)) / len(q))
 
-    def _like(self, seen: Observation, states: Sequence[States]) -> Observation:
-        assert seen.closed_loop is not None
-        Z = self._observed(states).columns(seen.names).W
-        return replace(seen, W=np.asfortranarray(Z[seen.closed_loop.rows]))
+    def _like(self, observation: Observation, states: Sequence[States]) -> Observation:
+        assert observation.closed_loop is not None
+        Z = self._observed(states).columns(observation.names).W
+        return replace(observation, W=np.asfortranarray(Z[observation.closed_loop.rows]))
 
     def _observed(self, states: Sequence[States]) -> Observation:
-        seen = [
+        observation = [
             observation_from_states(self.model, s, part.torque, part.selection, files=part.record.files)
             for s, part in zip(states, self.parts, strict=True)
         ]
-        return seen[0] if len(seen) == 1 else stack(seen)
+        return observation[0] if len(observation) == 1 else stack(observation)
 
 
 def closed_loop(

@@ -18,8 +18,8 @@ from typing import Any
 from runtime.estimators import wls
 from runtime.estimators.closed_loop import Run, loop_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.fixed_point import Array, Step, columns_of, iterate, options_of, told, trail_of
-from runtime.estimators.linear import System, assemble, standard_deviations
+from runtime.estimators.fixed_point import Array, Step, iterate, options_of, outcome_of, trail_of
+from runtime.estimators.linear import System, assemble, columns_asked, standard_deviations
 from runtime.model.generated import GeneratedModel
 from runtime.observation.system import Observation
 from runtime.settings.study import EstimateSettings
@@ -34,21 +34,21 @@ def didim(
 ) -> Estimate:
     """The Estimate; `details`: trail of the passes, contraction. SettingsError where no loop is attached to the observation."""
     loop, options = loop_of(observation, "didim"), options_of(settings)
-    seen = columns_of(observation, settings)
+    observation = observation.columns(columns_asked(observation, settings))
 
     def update(runs: Sequence[Run], X: Array) -> Step:
-        system = wls.system(loop.motion(runs, seen), EstimateSettings(method="wls"))
+        system = wls.system(loop.motion(runs, observation), EstimateSettings(method="wls"))
         fit = system.solve()
         _, C = standard_deviations(system, fit)
         return Step(fit.X, C, fit.residual_norm, system)
 
-    fixed = iterate(loop, seen, options, update)
-    status, message = told(loop, fixed, options, "DIDIM")
+    fixed = iterate(loop, observation, options, update)
+    status, message = outcome_of(loop, fixed, options, "DIDIM")
     system: System = fixed.step.kept
-    found = assemble(replace(system, settings=settings, iterations=len(fixed.trail)), system.solve(), model=model, provenance=provenance)
+    estimate = assemble(replace(system, settings=settings, iterations=len(fixed.trail)), system.solve(), model=model, provenance=provenance)
     return replace(
-        found,
-        status=status if found.status == "ok" else found.status,
-        message=" ".join(part for part in (found.message, message) if part),
+        estimate,
+        status=status if estimate.status == "ok" else estimate.status,
+        message=" ".join(part for part in (estimate.message, message) if part),
         details={"trail": trail_of(fixed), "contraction": fixed.contraction},
     )

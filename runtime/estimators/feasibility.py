@@ -17,7 +17,7 @@ import numpy as np
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.semidefinite import FURTHEST, Distance, Optimum, Prior, Rows, closest, margin, solutions
 from runtime.model.inertia import INERTIAL, PhysicalModel
-from runtime.settings.schema import Positive, Real, Settings
+from runtime.settings.schema import Positive, Real, Settings, Text
 
 Array = np.ndarray
 Bounds = tuple[Real | None, Real | None]
@@ -57,10 +57,10 @@ class Limits(Settings):
         Ellipsoid that holds the mass, by link.
     """
 
-    bounds: Mapping[str, Bounds] = field(default_factory=dict)
+    bounds: Mapping[Text, Bounds] = field(default_factory=dict)
     total_mass: Real | tuple[Real, Real] | None = None
-    centre: Mapping[str, tuple[tuple[Real, Real], tuple[Real, Real], tuple[Real, Real]]] = field(default_factory=dict)
-    ellipsoid: Mapping[str, Ellipsoid] = field(default_factory=dict)
+    centre: Mapping[Text, tuple[tuple[Real, Real], tuple[Real, Real], tuple[Real, Real]]] = field(default_factory=dict)
+    ellipsoid: Mapping[Text, Ellipsoid] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +91,12 @@ def feasibility(physical: PhysicalModel, names: Sequence[str], X: Array, limits:
     first = margin(physical.conditions, rows, space)
     if not first.solved:
         raise InputError(unsolved(first.status, rows, lambda other: margin(physical.conditions, other, space)))
-    blocking, conditions, found = [], list(physical.conditions), first
-    while found.solved and found.margin < -ROUNDING and conditions:
-        worst = max(found.duals, key=lambda name: found.duals[name])
-        blocking.append((worst, found.margin))
+    blocking, conditions, released = [], list(physical.conditions), first
+    while released.solved and released.margin < -ROUNDING and conditions:
+        worst = max(released.duals, key=lambda name: released.duals[name])
+        blocking.append((worst, released.margin))
         conditions = [c for c in conditions if c.name != worst]
-        found = margin(conditions, rows, space)
+        released = margin(conditions, rows, space)
     return Feasibility(first.margin, not blocking, tuple(blocking), first.chi)
 
 
@@ -105,10 +105,10 @@ def standard_parameters(physical: PhysicalModel, names: Sequence[str], X: Array,
 
     Of all such chi the one nearest to the values of the robot file, or to zero where it has none, in units of their size.
     """
-    judged = feasibility(physical, names, X, limits)
-    if not judged.feasible:
-        raise InputError(f"no standard parameters: {judged.text}; identify with estimate.method: feasible")
-    return nearest_standard(physical, names, X, judged.chi, limits)
+    answer = feasibility(physical, names, X, limits)
+    if not answer.feasible:
+        raise InputError(f"no standard parameters: {answer.text}; identify with estimate.method: feasible")
+    return nearest_standard(physical, names, X, answer.chi, limits)
 
 
 def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, start: Array, limits: Limits | None = None) -> Array:
@@ -117,9 +117,9 @@ def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, st
     space, rows = solutions(physical.rows(names), X, scale), limit_rows(physical, limits)
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
     least = float(np.clip(min(physical.smallest(start).values()) / 2, 0.0, LEAST))
-    found = closest(np.diag(1 / scale), chi0 / scale, physical.conditions, rows, space, least=least)
-    kept = found.solved and min(physical.smallest(found.chi).values()) >= 0
-    return found.chi if kept else start
+    nearest = closest(np.diag(1 / scale), chi0 / scale, physical.conditions, rows, space, least=least)
+    kept = nearest.solved and min(physical.smallest(nearest.chi).values()) >= 0
+    return nearest.chi if kept else start
 
 
 def limit_rows(physical: PhysicalModel, limits: Limits | None) -> Rows:

@@ -32,7 +32,7 @@ from typing import Any, Literal
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.estimators import ols, wls
+from runtime.estimators import wls
 from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
@@ -94,11 +94,11 @@ def feasible(
         raise InputError("method feasible needs the model: it knows which parameters belong to one link")
     options = structure(FeasibleOptions, settings.options, ("estimate", "options"))
     physical = physical_model(model)
-    system = linear(observation, settings, options)
+    system = wls.least_squares(observation, settings, options.linear)
     free = system.solve()
-    judged = feasibility(physical, system.names, free.X, options)
-    if judged.feasible and judged.margin >= options.margin and options.prior == "none":
-        X, chi, weight = free.X, judged.chi, 0.0
+    unconstrained = feasibility(physical, system.names, free.X, options)
+    if unconstrained.feasible and unconstrained.margin >= options.margin and options.prior == "none":
+        X, chi, weight = free.X, unconstrained.chi, 0.0
     else:
         fixed = (
             replace(options, weight=held_out_weight(observation, system, physical, options)) if options.weight == "held-out" else options
@@ -107,8 +107,8 @@ def feasible(
         X = physical.rows(system.names) @ chi
     if weight == 0:  # nothing was pulled: chi is one of many
         chi = nearest_standard(physical, system.names, X, chi, options)
-    found = replace(free, X=X, residual_norm=residual_norm(system.weighted, X))
-    estimate = assemble(replace(system, settings=settings), found, model=model, provenance=provenance)
+    fit = replace(free, X=X, residual_norm=residual_norm(system.weighted, X))
+    estimate = assemble(replace(system, settings=settings), fit, model=model, provenance=provenance)
     smallest = physical.smallest(chi)
     active = [name for name, value in smallest.items() if value < ACTIVE * options.margin]
     without = assemble(system, free, model=model)
@@ -120,27 +120,20 @@ def feasible(
         "weight": weight,
         "least_squares": {
             "method": system.settings.method,
-            "feasible": judged.feasible,
-            "margin": judged.margin,
-            "blocking": [{"condition": name, "margin": t} for name, t in judged.blocking],
+            "feasible": unconstrained.feasible,
+            "margin": unconstrained.margin,
+            "blocking": [{"condition": name, "margin": t} for name, t in unconstrained.blocking],
             "relative_error": without.relative_error,
             "residual_norm": without.residual_norm,
             "X": without.X,
         },
     }
-    message = " ".join(part for part in (estimate.message, told(system, judged.text, active, estimate, without)) if part)
+    message = " ".join(part for part in (estimate.message, difference_text(system, unconstrained.text, active, estimate, without)) if part)
     if min(smallest.values()) < 0:
         estimate = replace(estimate, status="not-converged")
         message += " The solver left a condition violated: try another margin, a prior, or bounds on the masses."
     scatter = bootstrapped(observation, system, physical, options, weight) if options.bootstrap else estimate.sigma_corrected
     return replace(estimate, message=message, details=details, sigma_corrected=scatter)
-
-
-def linear(observation: Observation, settings: EstimateSettings, options: FeasibleOptions) -> System:
-    """The rows as ols or wls weighs them."""
-    if settings.weights == "none":
-        return ols.system(observation, EstimateSettings("ols", "none", settings.columns, options.linear))
-    return wls.system(observation, EstimateSettings("wls", settings.weights, settings.columns, options.linear))
 
 
 def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> tuple[Array, float]:
@@ -194,10 +187,10 @@ def fitted(R: Array, z: Array, physical: PhysicalModel, options: FeasibleOptions
     def attempt(within: Rows) -> Optimum:
         return closest(R, z, physical.conditions, within, space, least=options.margin, pull=pull)
 
-    found = attempt(rows)
-    if not found.solved:
-        raise InputError(unsolved(found.status, rows, attempt))
-    return found.chi
+    optimum = attempt(rows)
+    if not optimum.solved:
+        raise InputError(unsolved(optimum.status, rows, attempt))
+    return optimum.chi
 
 
 def residual_norm(rows: Factor, X: Array) -> float:
@@ -217,9 +210,9 @@ def bootstrapped(observation: Observation, system: System, physical: PhysicalMod
     return np.asarray(np.std(drawn_again(blocks, estimator, options.bootstrap, options.seed), axis=0, ddof=1))
 
 
-def told(system: System, judged: str, active: list[str], estimate: Estimate, without: Estimate) -> str:
+def difference_text(system: System, answer: str, active: list[str], estimate: Estimate, without: Estimate) -> str:
     """What the conditions changed, in words."""
     return (
-        f"Least squares ({system.settings.method}) is {judged}. With the conditions the relative error is {estimate.relative_error:.3f} % "
+        f"Least squares ({system.settings.method}) is {answer}. With the conditions the relative error is {estimate.relative_error:.3f} % "
         f"instead of {without.relative_error:.3f} %; at their limit: {', '.join(active) or 'none'}."
     )

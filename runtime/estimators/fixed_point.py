@@ -89,33 +89,21 @@ def options_of(settings: EstimateSettings) -> FixedPointOptions:
     return structure(FixedPointOptions, settings.options, ("estimate", "options"))
 
 
-def columns_of(observation: Observation, settings: EstimateSettings) -> Observation:
-    """The columns that are estimated; the other parameters are zero."""
-    if settings.columns == "all":
-        return observation
-    unknown = [name for name in settings.columns if name not in observation.names]
-    if unknown:
-        raise SettingsError(
-            f"no parameter {', '.join(unknown)}; the model has {', '.join(observation.names)}", path=("estimate", "columns")
-        )
-    return observation.columns(settings.columns)
-
-
 def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
     """All base parameters (b,) from those of the columns `names`; the others are zero."""
     by_name = dict(zip(names, X, strict=True))
     return np.array([by_name.get(name, 0.0) for name in every])
 
 
-def initial(loop: ClosedLoop, seen: Observation, which: str | Mapping[str, float]) -> Array:
+def initial(loop: ClosedLoop, observation: Observation, which: str | Mapping[str, float]) -> Array:
     """X of the columns by ordinary least squares, from the robot file, of unit inertia, or as given."""
-    names = seen.names
+    names = observation.names
     if not isinstance(which, str):
         if unknown := [name for name in which if name not in names]:
             raise SettingsError(f"no parameter {', '.join(unknown)}; there are {', '.join(names)}", path=("estimate", "options", "start"))
         return np.array([which.get(name, 0.0) for name in names])
     if which == "ols":
-        return ols.system(seen, EstimateSettings()).solve().X
+        return ols.system(observation, EstimateSettings()).solve().X
     model: Any = loop.model
     standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)
     if which == "values":
@@ -137,11 +125,13 @@ def initial(loop: ClosedLoop, seen: Observation, which: str | Mapping[str, float
     return np.array([X[name] for name in names])
 
 
-def iterate(loop: ClosedLoop, seen: Observation, options: FixedPointOptions, update: Callable[[Sequence[Run], Array], Step]) -> Fixed:
-    """The fixed point of X -> update(simulation with X, X), X of the columns of `seen`."""
-    names, every = seen.names, loop.model.BASE_PARAMETERS
-    X = initial(loop, seen, options.start)
-    reference = X if options.gains in ("start", "one") else initial(loop, seen, options.gains)
+def iterate(
+    loop: ClosedLoop, observation: Observation, options: FixedPointOptions, update: Callable[[Sequence[Run], Array], Step]
+) -> Fixed:
+    """The fixed point of X -> update(simulation with X, X), X of the columns of `observation`."""
+    names, every = observation.names, loop.model.BASE_PARAMETERS
+    X = initial(loop, observation, options.start)
+    reference = X if options.gains in ("start", "one") else initial(loop, observation, options.gains)
     J = None if options.gains == "one" else loop.inertia(full(names, reference, every))
     if J is not None and not np.all(J > 0):
         raise InputError(
@@ -217,7 +207,7 @@ def _contraction(changes: Sequence[float]) -> float:
     return changes[-1] / changes[-2] if len(changes) > 1 and changes[-2] > 0 else float("nan")
 
 
-def told(loop: ClosedLoop, fixed: Fixed, options: FixedPointOptions, method: str) -> tuple[Status, str]:
+def outcome_of(loop: ClosedLoop, fixed: Fixed, options: FixedPointOptions, method: str) -> tuple[Status, str]:
     """Status and message of an Estimate."""
     parts = [part for part in (fixed.message, loop.assumption) if part]
     if not fixed.converged:

@@ -97,8 +97,7 @@ def irls(
     first = start.solve()
     if first.rank < len(start.names):
         return assemble(replace(start, settings=settings), first, model=model, provenance=provenance)
-    columns = [observation.names.index(name) for name in start.names]
-    W = observation.W[:, columns]
+    W = observation.columns(start.names).W
     fit = _iterated(observation, W, start.raw, first.X, "huber", options)
     if options.loss == "tukey":
         again = _iterated(observation, W, start.raw, fit.X, "tukey", options)
@@ -173,20 +172,20 @@ def _estimate(
     if not fit.converged:
         message = f"The weights have not converged after {options.passes} passes. Raise estimate.options.passes, or use loss: huber."
         system = replace(system, status="not-converged", message=message)
-    found = assemble(system, replace(system.solve(), X=fit.X), model=model, provenance=provenance)
+    estimate = assemble(system, replace(system.solve(), X=fit.X), model=model, provenance=provenance)
     psi, inside = fit.w * fit.u, slope(fit.u, loss, tuning)
     C = fit.T @ fit.T.T * np.mean(psi**2) / np.mean(inside) ** 2 * r / max(r - b, 1)
     # to first order about the fit, rows W/S sqrt(mean psi') and residuals psi/sqrt(mean psi')
     bend, rows = np.sqrt(np.mean(inside)), np.repeat(1 / fit.S, observation.rows)
     A = np.column_stack([W * rows[:, None] * bend, (observation.Y - W @ fit.X) * rows * fit.w / bend])
     C_b = block_covariance(split_rows(A, observation.blocks(options.block)), np.zeros(b), fit.T / bend)
-    shares = {joint.joint: float(np.mean(fit.w[observation.joint(j)] < DOWN)) for j, joint in enumerate(found.per_joint) if joint.rows}
+    shares = {joint.joint: float(np.mean(fit.w[observation.joint(j)] < DOWN)) for j, joint in enumerate(estimate.per_joint) if joint.rows}
     return replace(
-        found,
+        estimate,
         covariance=C,
         sigma=np.sqrt(np.diag(C)),
         sigma_corrected=np.sqrt(np.diag(C_b)),
-        message=" ".join(part for part in (found.message, _told(shares)) if part),
+        message=" ".join(part for part in (estimate.message, _told(shares)) if part),
         details={"loss": loss, "tuning": tuning, "scales": fit.S, "down_weighted": shares},
     )
 

@@ -28,8 +28,8 @@ from runtime.estimators import ols, wls
 from runtime.estimators.block_covariance import deletions
 from runtime.estimators.closed_loop import Run, loop_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.fixed_point import Array, Step, columns_of, iterate, options_of, told, trail_of
-from runtime.estimators.linear import assemble, outcome
+from runtime.estimators.fixed_point import Array, Step, iterate, options_of, outcome_of, trail_of
+from runtime.estimators.linear import assemble, columns_asked, outcome
 from runtime.model.generated import GeneratedModel
 from runtime.observation.system import Observation, split_rows
 from runtime.settings.study import EstimateSettings
@@ -52,25 +52,25 @@ def iv(
     SettingsError where no loop is attached to the observation.
     """
     loop, options = loop_of(observation, "iv"), options_of(settings)
-    seen = columns_of(observation, settings)
-    names = seen.names
-    base = ols.system(seen, EstimateSettings())
+    observation = observation.columns(columns_asked(observation, settings))
+    names = observation.names
+    base = ols.system(observation, EstimateSettings())
     first = base.solve()
     if first.rank < len(names):
         return assemble(replace(base, settings=settings), first, model=model, provenance=provenance)
 
     def update(runs: Sequence[Run], X: Array) -> Step:
-        Z = loop.instruments(runs, seen).W
-        s = _scales(seen, X, base.raw)
-        found = _solved(seen, Z, s)
-        norm = float(np.linalg.norm((seen.Y - seen.W @ found[0]) / np.repeat(s, seen.rows)))
-        return Step(found[0], found[1], norm, (Z, s, found[2]))
+        Z = loop.instruments(runs, observation).W
+        s = wls.floored(base.raw, wls.common_scales(base.raw, X, len(X)))
+        solution = _solved(observation, Z, s)
+        norm = float(np.linalg.norm((observation.Y - observation.W @ solution[0]) / np.repeat(s, observation.rows)))
+        return Step(solution[0], solution[1], norm, (Z, s, solution[2]))
 
-    fixed = iterate(loop, seen, options, update)
-    status, message = told(loop, fixed, options, "IV")
+    fixed = iterate(loop, observation, options, update)
+    status, message = outcome_of(loop, fixed, options, "IV")
     X, C = fixed.step.X, fixed.step.covariance
     Z, s, A = fixed.step.kept
-    quality = _quality(seen, Z, s)
+    quality = _quality(observation, Z, s)
     if quality["cond"] > CONDITION or quality["correlation"] < CORRELATION:
         status = "weak-instruments" if status == "ok" else status
         weak = (
@@ -80,19 +80,19 @@ def iv(
         message = f"{weak} {message}".strip()
     weighted = replace(base, settings=settings, weighted=base.raw.weighted(1 / s), scales=tuple(s.tolist()), known_variance=True)
     least = weighted.solve()
-    told_first = outcome(weighted, least)
-    found = assemble(replace(weighted, iterations=len(fixed.trail)), replace(least, X=X), model=model, provenance=provenance)
-    rows = np.repeat(1 / s, seen.rows)
-    residual = (seen.Y - seen.W @ X) * rows
-    U = _by_block(seen, Z * rows[:, None], residual, A)
-    U_least = _by_block(seen, seen.W * rows[:, None], residual, least.T @ least.T.T)
+    first_outcome = outcome(weighted, least)
+    estimate = assemble(replace(weighted, iterations=len(fixed.trail)), replace(least, X=X), model=model, provenance=provenance)
+    rows = np.repeat(1 / s, observation.rows)
+    residual = (observation.Y - observation.W @ X) * rows
+    U = _by_block(observation, Z * rows[:, None], residual, A)
+    U_least = _by_block(observation, observation.W * rows[:, None], residual, least.T @ least.T.T)
     return replace(
-        found,
+        estimate,
         covariance=C,
         sigma=np.sqrt(np.diag(C)),
         sigma_corrected=np.linalg.norm(U, axis=0),
-        status=status if told_first[0] == "ok" else told_first[0],
-        message=" ".join(part for part in (told_first[1], message) if part),
+        status=status if first_outcome[0] == "ok" else first_outcome[0],
+        message=" ".join(part for part in (first_outcome[1], message) if part),
         details={
             "trail": trail_of(fixed),
             "contraction": fixed.contraction,
@@ -107,24 +107,17 @@ def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
     sigma = np.linalg.norm(U, axis=0)
     z = np.abs(d) / np.where(sigma > 0, sigma, np.inf)
     worst = int(np.argmax(z))
-    found: dict[str, Any] = {"largest": float(z[worst]), "parameter": names[worst]}
+    statistics: dict[str, Any] = {"largest": float(z[worst]), "parameter": names[worst]}
     if len(U) >= 2 * len(d) and np.all(sigma > 0):
         statistic = float(np.sum(np.linalg.lstsq((U / sigma).T, d / sigma, rcond=None)[0] ** 2))
-        found |= {"statistic": statistic, "probability": float(chi2.sf(statistic, len(d)))}
-    return found
+        statistics |= {"statistic": statistic, "probability": float(chi2.sf(statistic, len(d)))}
+    return statistics
 
 
-def _scales(seen: Observation, X: Array, raw: Any) -> Array:
-    """s_j, shape (n,), of the residual of X."""
-    share = max(1 - len(X) / raw.rows, 1 / raw.rows)
-    s = np.array([joint.residual_norm(X) / np.sqrt(max(joint.rows, 1) * share) for joint in raw.joints])
-    return wls.floored(raw, s)
-
-
-def _solved(seen: Observation, Z: Array, s: Array) -> tuple[Array, Array, Array]:
+def _solved(observation: Observation, Z: Array, s: Array) -> tuple[Array, Array, Array]:
     """X, C and A = (Z'VW)^-1."""
-    rows = np.repeat(1 / s, seen.rows)
-    W, Zw, Y = seen.W * rows[:, None], Z * rows[:, None], seen.Y * rows
+    rows = np.repeat(1 / s, observation.rows)
+    W, Zw, Y = observation.W * rows[:, None], Z * rows[:, None], observation.Y * rows
     size = np.linalg.norm(W, axis=0)
     W, Zw = W / size, Zw / size
     try:
@@ -139,10 +132,10 @@ def _solved(seen: Observation, Z: Array, s: Array) -> tuple[Array, Array, Array]
     return X / size, C / np.outer(size, size), A / np.outer(size, size)
 
 
-def _quality(seen: Observation, Z: Array, s: Array) -> dict[str, float]:
+def _quality(observation: Observation, Z: Array, s: Array) -> dict[str, float]:
     """Condition of Z'VW with unit columns, smallest correlation of the two column spaces, smallest of a column with its own instrument."""
-    rows = np.repeat(1 / s, seen.rows)[:, None]
-    W, Zw = seen.W * rows, Z * rows
+    rows = np.repeat(1 / s, observation.rows)[:, None]
+    W, Zw = observation.W * rows, Z * rows
     norms = np.linalg.norm(W, axis=0), np.maximum(np.linalg.norm(Zw, axis=0), 1e-300)
     own = np.abs(np.einsum("ik,ik->k", W / norms[0], Zw / norms[1]))
     spaces = np.linalg.svd(np.linalg.qr(Zw)[0].T @ np.linalg.qr(W)[0], compute_uv=False)
@@ -153,11 +146,11 @@ def _quality(seen: Observation, Z: Array, s: Array) -> dict[str, float]:
     }
 
 
-def _by_block(seen: Observation, Z: Array, residual: Array, A: Array) -> Array:
+def _by_block(observation: Observation, Z: Array, residual: Array, A: Array) -> Array:
     """Change of X = A Z'Y by each block left out (`runtime.estimators.block_covariance`), shape (K, b), times sqrt((K - 1)/K); nan for one block.
 
     Z, residual : weighted rows of the instruments, shape (r, b), and Y - W X, shape (r,).
     """
     R = np.asarray(np.linalg.qr(Z, mode="r"))
-    U = deletions(split_rows(np.column_stack([Z, residual]), seen.blocks()), np.zeros(Z.shape[1]), np.linalg.inv(R), A @ R.T)
+    U = deletions(split_rows(np.column_stack([Z, residual]), observation.blocks()), np.zeros(Z.shape[1]), np.linalg.inv(R), A @ R.T)
     return U if len(U) > 1 else np.full_like(U, np.nan)

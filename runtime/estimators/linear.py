@@ -82,13 +82,18 @@ def checked_options(settings: EstimateSettings, known: Sequence[str] = OPTIONS) 
 
 def raw_factor(observation: Observation, settings: EstimateSettings) -> Factor:
     """Factor of [W Y] on the columns that `settings` asks for."""
+    names = columns_asked(observation, settings)
+    return observation.factor if names == observation.names else observation.factor.select(names)
+
+
+def columns_asked(observation: Observation, settings: EstimateSettings) -> tuple[str, ...]:
+    """The columns that `settings` asks for; SettingsError where the observation lacks one."""
     if settings.columns == "all":
-        return observation.factor
-    unknown = [name for name in settings.columns if name not in observation.names]
-    if unknown:
+        return observation.names
+    if unknown := [name for name in settings.columns if name not in observation.names]:
         message = f"no parameter {', '.join(unknown)}; the model has {', '.join(observation.names)}"
         raise SettingsError(message, path=("estimate", "columns"))
-    return observation.factor.select(settings.columns)
+    return tuple(settings.columns)
 
 
 def standard_deviations(system: System, fit: Solution) -> tuple[float, Array]:

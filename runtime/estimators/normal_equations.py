@@ -25,7 +25,8 @@ from scipy.linalg import LinAlgError, cho_solve, cholesky
 from scipy.linalg.lapack import dpocon
 
 from runtime.estimators.solution import solve
-from runtime.observation.qr_factor import Array, Factor, JointFactor, stacked, triangularise
+from runtime.observation.qr_factor import Array, Factor, JointFactor
+from runtime.observation.segments import RowsFactor
 
 Block = Sequence[Array]
 """Rows of one block, by joint: [W_j[:, C_j] Y_j]', shape (|C_j| + 1, B)."""
@@ -140,14 +141,11 @@ def least_squares(
 
 def triangular(blocks: Iterable[Block], columns: Sequence[Array], names: Sequence[str]) -> Factor:
     """Structured triangular factor of [W Y], updated block by block: R_j = R factor of [R_j; new rows of joint j]."""
-    R = [np.zeros((0, len(C) + 1)) for C in columns]
-    counts = [0] * len(R)
+    joints = [RowsFactor(len(C) + 1) for C in columns]
     for block in blocks:
-        for j, rows in enumerate(block):
-            R[j] = triangularise(np.vstack([R[j], rows.T]))
-            counts[j] += rows.shape[1]
-    joints = tuple(JointFactor(np.asarray(C), R_j, count) for C, R_j, count in zip(columns, R, counts, strict=True))
-    return Factor(tuple(names), stacked(joints, len(names)), joints)
+        for joint, rows in zip(joints, block, strict=True):
+            joint.take(rows)
+    return Factor.of(names, [JointFactor(np.asarray(C), joint.factor(), joint.count) for C, joint in zip(columns, joints, strict=True)])
 
 
 def _by_triangular_factor(blocks: Callable[[], Iterable[Block]], columns: Sequence[Array], b: int) -> LeastSquares:

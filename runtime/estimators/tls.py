@@ -29,10 +29,10 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from runtime.errors import SettingsError
-from runtime.estimators import ols, wls
+from runtime.estimators import wls
 from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.linear import System, assemble
+from runtime.estimators.linear import assemble
 from runtime.model.generated import GeneratedModel
 from runtime.observation.qr_factor import Array, triangularise
 from runtime.observation.system import Observation, split_rows
@@ -106,17 +106,19 @@ def tls(
 ) -> Estimate:
     """The Estimate by total least squares; `details` holds the exact and the noisy columns, t_j, s_min and |v_Y|."""
     options = tls_options(settings)
-    system = _linear(observation, settings, options)
+    if settings.weights == "covariance":
+        raise SettingsError("'covariance'; tls weighs joints, use none, joint or iterated", path=("estimate", "weights"))
+    system = wls.least_squares(observation, settings, {"block": options.block, "rank_tolerance": options.rank_tolerance})
     free = system.solve()
     if free.rank < len(system.names):
         return assemble(replace(system, settings=settings), free, model=model, provenance=provenance)
-    seen = observation if system.names == observation.names else observation.columns(system.names)
-    split = split_columns(seen, options)
+    observation = observation.columns(system.names)
+    split = split_columns(observation, options)
     if not len(split.noisy):
-        found = assemble(replace(system, settings=settings), free, model=model, provenance=provenance)
-        return replace(found, details=_details(seen, split, np.array(system.scales), None))
-    t = torque_errors(seen, settings, split, options, adjusted(seen, split, np.array(system.scales)))
-    solved = total(factored(seen, split, t), split, error_root(seen, split, t))
+        estimate = assemble(replace(system, settings=settings), free, model=model, provenance=provenance)
+        return replace(estimate, details=_details(observation, split, np.array(system.scales), None))
+    t = torque_errors(observation, settings, split, options, adjusted(observation, split, np.array(system.scales)))
+    solved = total(factored(observation, split, t), split, error_root(observation, split, t))
     if solved.smallest > HIDDEN * solved.without:
         message = (
             f"The errors assumed for the positions explain the columns as well as the motion does: s_min {solved.smallest:.3g} against {solved.without:.3g} "
@@ -124,22 +126,22 @@ def tls(
             "or use a richer motion or fewer columns."
         )
         return assemble(replace(system, settings=settings, status="ill-posed", message=message), free, model=model, provenance=provenance)
-    e = seen.Y - seen.W @ solved.X
-    residual = float(np.linalg.norm(e / np.repeat(system.scales, seen.rows)))
-    found = assemble(
+    e = observation.Y - observation.W @ solved.X
+    residual = float(np.linalg.norm(e / np.repeat(system.scales, observation.rows)))
+    estimate = assemble(
         replace(system, settings=settings), replace(free, X=solved.X, residual_norm=residual), model=model, provenance=provenance
     )
-    message = found.message
+    message = estimate.message
     if solved.v < DOUBTFUL:
         message = (
             f"{message} |v_Y| = {solved.v:.2g}: the solution leans on the direction in which W is weakest; compare it with wls.".strip()
         )
-    found = replace(found, message=message, details=_details(seen, split, t, solved))
+    estimate = replace(estimate, message=message, details=_details(observation, split, t, solved))
     if not options.bootstrap:
-        return found
-    C = bootstrap_covariance(seen, split, t, options)
+        return estimate
+    C = bootstrap_covariance(observation, split, t, options)
     sigma = np.sqrt(np.diag(C))
-    return replace(found, covariance=C, sigma=sigma, sigma_corrected=sigma)
+    return replace(estimate, covariance=C, sigma=sigma, sigma_corrected=sigma)
 
 
 def tls_options(settings: EstimateSettings) -> TlsOptions:
@@ -150,61 +152,61 @@ def tls_options(settings: EstimateSettings) -> TlsOptions:
     return structure(TlsOptions, settings.options, ("estimate", "options"))
 
 
-def split_columns(seen: Observation, options: TlsOptions) -> Split:
-    """Exact and noisy columns, from seen.errors; all exact where the positions are."""
-    b = len(seen.names)
+def split_columns(observation: Observation, options: TlsOptions) -> Split:
+    """Exact and noisy columns, from observation.errors; all exact where the positions are."""
+    b = len(observation.names)
     if options.position_error == 0:
-        return Split(np.arange(b), np.arange(0), np.zeros((seen.n, b, b)))
-    if seen.errors is None:
+        return Split(np.arange(b), np.arange(0), np.zeros((observation.n, b, b)))
+    if observation.errors is None:
         raise SettingsError(
             "this observation does not know the errors of its columns; make it with runtime.observation.position_errors.with_errors",
             path=("estimate", "method"),
         )
-    error = np.sqrt(np.einsum("j,jaa->a", np.asarray(seen.rows, dtype=float), seen.errors))
-    noisy = error > NOISY * np.linalg.norm(seen.W, axis=0)
-    return Split(np.flatnonzero(~noisy), np.flatnonzero(noisy), seen.errors)
+    error = np.sqrt(np.einsum("j,jaa->a", np.asarray(observation.rows, dtype=float), observation.errors))
+    noisy = error > NOISY * np.linalg.norm(observation.W, axis=0)
+    return Split(np.flatnonzero(~noisy), np.flatnonzero(noisy), observation.errors)
 
 
-def torque_errors(seen: Observation, settings: EstimateSettings, split: Split, options: TlsOptions, X: Array) -> Array:
+def torque_errors(observation: Observation, settings: EstimateSettings, split: Split, options: TlsOptions, X: Array) -> Array:
     """t_j, shape (n,): as given, or t_j^2 = mean e_j^2 - X'C_j X at the solution; one for all joints without weights."""
     if options.torque_error is not None:
         given = (
-            np.broadcast_to(np.asarray(options.torque_error, dtype=float), (seen.n,))
-            if np.size(options.torque_error) in (1, seen.n)
+            np.broadcast_to(np.asarray(options.torque_error, dtype=float), (observation.n,))
+            if np.size(options.torque_error) in (1, observation.n)
             else None
         )
         if given is None:
-            message = f"{np.size(options.torque_error)} values; expected one or {seen.n}, one per joint"
+            message = f"{np.size(options.torque_error)} values; expected one or {observation.n}, one per joint"
             raise SettingsError(message, path=("estimate", "options", "torque_error"))
         return np.array(given)
-    share = max(1 - len(X) / sum(seen.rows), 1 / sum(seen.rows))
-    t = np.ones(seen.n)
+    share = max(1 - len(X) / sum(observation.rows), 1 / sum(observation.rows))
+    t = np.ones(observation.n)
     for _ in range(PASSES):
-        squares = np.array([np.sum((seen.Y - seen.W @ X)[seen.joint(j)] ** 2) for j in range(seen.n)])
-        own = np.array([X @ split.C[j] @ X for j in range(seen.n)])
-        N = np.asarray(seen.rows, dtype=float)
+        squares = np.array([np.sum((observation.Y - observation.W @ X)[observation.joint(j)] ** 2) for j in range(observation.n)])
+        own = np.array([X @ split.C[j] @ X for j in range(observation.n)])
+        N = np.asarray(observation.rows, dtype=float)
         if settings.weights == "none":
-            squares, own, N = (np.full(seen.n, value) for value in (squares.sum(), N @ own / N.sum(), N.sum()))
+            squares, own, N = (np.full(observation.n, value) for value in (squares.sum(), N @ own / N.sum(), N.sum()))
         variance = squares / np.maximum(N * share, 1)
         t = np.sqrt(np.maximum(variance - own, LEAST**2 * variance))
         t = np.where(t > 0, t, 1.0)
-        solved = total(factored(seen, split, t), split, error_root(seen, split, t))
+        solved = total(factored(observation, split, t), split, error_root(observation, split, t))
         if solved.smallest > HIDDEN * solved.without:
             break
         X = solved.X
     return t
 
 
-def adjusted(seen: Observation, split: Split, scales: Array) -> Array:
+def adjusted(observation: Observation, split: Split, scales: Array) -> Array:
     """X = (sum_j (W_j'W_j - N_j C_j) / s_j^2)^-1 sum_j W_j'Y_j / s_j^2, shape (b,): the errors of the columns taken off, no torque noise needed."""
-    row = np.repeat(scales, seen.rows)
-    A = np.einsum("j,jab->ab", -np.asarray(seen.rows, dtype=float) / scales**2, split.C) + (W := seen.W / row[:, None]).T @ W
-    return np.asarray(np.linalg.lstsq(A, W.T @ (seen.Y / row), rcond=None)[0])
+    row = np.repeat(scales, observation.rows)
+    A = np.einsum("j,jab->ab", -np.asarray(observation.rows, dtype=float) / scales**2, split.C) + (W := observation.W / row[:, None]).T @ W
+    return np.asarray(np.linalg.lstsq(A, W.T @ (observation.Y / row), rcond=None)[0])
 
 
-def error_root(seen: Observation, split: Split, t: Array) -> Array:
+def error_root(observation: Observation, split: Split, t: Array) -> Array:
     """L of the noisy columns, shape (b_2, b_2): L L' the mean covariance of the errors of a row after the rows of joint j were divided by t_j."""
-    share = np.asarray(seen.rows, dtype=float) / sum(seen.rows) / t**2
+    share = np.asarray(observation.rows, dtype=float) / sum(observation.rows) / t**2
     C = np.einsum("j,jab->ab", share, split.C)[np.ix_(split.noisy, split.noisy)]
     deviation = np.sqrt(np.diag(C))
     values, vectors = np.linalg.eigh(C / np.outer(deviation, deviation))
@@ -212,9 +214,9 @@ def error_root(seen: Observation, split: Split, t: Array) -> Array:
     return triangularise((deviation[:, None] * vectors * np.sqrt(values)).T).T
 
 
-def factored(seen: Observation, split: Split, t: Array) -> Array:
+def factored(observation: Observation, split: Split, t: Array) -> Array:
     """Triangular factor of the rows [W_1 W_2 Y] over t_j, shape (b + 1, b + 1)."""
-    return triangularise(_rows(seen, split, t))
+    return triangularise(_rows(observation, split, t))
 
 
 def total(R: Array, split: Split, L: Array) -> Solved:
@@ -232,33 +234,22 @@ def total(R: Array, split: Split, L: Array) -> Solved:
     return Solved(X, float(s[-1]), float(np.linalg.svd(R22[:, :b2], compute_uv=False)[-1]), float(abs(v[-1])))
 
 
-def bootstrap_covariance(seen: Observation, split: Split, t: Array, options: TlsOptions) -> Array:
+def bootstrap_covariance(observation: Observation, split: Split, t: Array, options: TlsOptions) -> Array:
     """Covariance of X over records of resampled blocks of time, shape (b, b)."""
-    blocks, L = split_rows(_rows(seen, split, t), seen.blocks(options.block)), error_root(seen, split, t)
+    blocks, L = split_rows(_rows(observation, split, t), observation.blocks(options.block)), error_root(observation, split, t)
     X = drawn_again(blocks, lambda gram: total(gram_root(gram), split, L).X, options.bootstrap, options.seed)
     return np.atleast_2d(np.cov(X, rowvar=False))
 
 
-def _rows(seen: Observation, split: Split, t: Array) -> Array:
+def _rows(observation: Observation, split: Split, t: Array) -> Array:
     order = [*split.exact, *split.noisy]
-    return np.asarray(np.column_stack([seen.W[:, order], seen.Y]) / np.repeat(t, seen.rows)[:, None])
+    return np.asarray(np.column_stack([observation.W[:, order], observation.Y]) / np.repeat(t, observation.rows)[:, None])
 
 
-def _linear(observation: Observation, settings: EstimateSettings, options: TlsOptions) -> System:
-    """Least squares of the same rows, weighted as `weights` says."""
-    given = {"block": options.block, "rank_tolerance": options.rank_tolerance}
-    linear = {key: value for key, value in given.items() if value is not None}
-    if settings.weights == "covariance":
-        raise SettingsError("'covariance'; tls weighs joints, use none, joint or iterated", path=("estimate", "weights"))
-    if settings.weights == "none":
-        return ols.system(observation, replace(settings, method="ols", options=linear))
-    return wls.system(observation, replace(settings, method="wls", options=linear))
-
-
-def _details(seen: Observation, split: Split, t: Array, solved: Solved | None) -> dict[str, Any]:
+def _details(observation: Observation, split: Split, t: Array, solved: Solved | None) -> dict[str, Any]:
     return {
-        "exact": [seen.names[i] for i in split.exact],
-        "noisy": [seen.names[i] for i in split.noisy],
+        "exact": [observation.names[i] for i in split.exact],
+        "noisy": [observation.names[i] for i in split.noisy],
         "torque_error": t,
         "s_min": None if solved is None else solved.smallest,
         "s_min_without_Y": None if solved is None else solved.without,

@@ -14,12 +14,15 @@ The chapter leaves weights open; Gautier (1997) and BIRDy use the first and the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
 from runtime.errors import SettingsError
+from runtime.estimators import ols
 from runtime.estimators.estimate import Status
 from runtime.estimators.linear import OPTIONS, System, checked_options, raw_factor
 from runtime.estimators.solution import joint_scatter, solve
@@ -46,6 +49,14 @@ def system(observation: Observation, settings: EstimateSettings) -> System:
     return _iterated(start) if settings.weights == "iterated" else start
 
 
+def least_squares(observation: Observation, settings: EstimateSettings, options: Mapping[str, Any]) -> System:
+    """The rows as `settings.weights` asks, those of ols for "none"; options : block, rank_tolerance, passes where given."""
+    given = {key: value for key, value in options.items() if value is not None}
+    if settings.weights == "none":
+        return ols.system(observation, EstimateSettings("ols", "none", settings.columns, given))
+    return system(observation, EstimateSettings("wls", settings.weights, settings.columns, given))
+
+
 def _by_joint(observation: Observation, settings: EstimateSettings, raw: Factor) -> System:
     scales = _first_scales(raw, settings.options.get("rank_tolerance"))
     weighted = raw.weighted(1 / scales)
@@ -54,14 +65,13 @@ def _by_joint(observation: Observation, settings: EstimateSettings, raw: Factor)
 
 def _first_scales(raw: Factor, tolerance: float | None) -> np.ndarray:
     """s_j from joint j alone; from the common ordinary least squares where joint j has too few rows. Never zero."""
-    common = _common_scales(raw, solve(raw, tolerance).X, tolerance)
+    fit = solve(raw, tolerance)
     own = joint_scatter(raw, tolerance)
-    return floored(raw, np.array([c if s is None else s for s, c in zip(own, common, strict=True)]))
+    return floored(raw, np.array([c if s is None else s for s, c in zip(own, common_scales(raw, fit.X, fit.rank), strict=True)]))
 
 
-def _common_scales(raw: Factor, X: np.ndarray, tolerance: float | None) -> np.ndarray:
+def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
     """s_j, shape (n,), of the residuals of X: each joint carries its share b N_j/r of the lost degrees of freedom."""
-    rank = solve(raw, tolerance).rank
     share = max(1 - rank / raw.rows, 1 / raw.rows)
     return np.array([joint.residual_norm(X) / np.sqrt(max(joint.rows, 1) * share) for joint in raw.joints])
 
@@ -77,9 +87,9 @@ def floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
 def _iterated(start: System) -> System:
     raw, tolerance = start.raw, start.options.get("rank_tolerance")
     limit = int(start.options.get("passes", PASSES))
-    scales, change, done = np.array(start.scales), np.inf, 0
+    scales, change, done, rank = np.array(start.scales), np.inf, 0, solve(raw, tolerance).rank
     while change >= CONVERGED and done < limit:
-        new = floored(raw, _common_scales(raw, solve(raw.weighted(1 / scales), tolerance).X, tolerance))
+        new = floored(raw, common_scales(raw, solve(raw.weighted(1 / scales), tolerance).X, rank))
         change = float(np.max(np.abs(new / scales - 1)))
         scales, done = new, done + 1
     status: Status = "ok"
@@ -101,8 +111,7 @@ def _covariance(observation: Observation, settings: EstimateSettings, raw: Facto
         counts = ", ".join(map(str, observation.rows))
         message = f"covariance needs every joint at every instant; rows per joint are {counts}. Use weights: joint, or rows.low_speed: 0"
         raise SettingsError(message, path=("estimate", "weights"))
-    columns = [observation.names.index(name) for name in raw.names]
-    W = observation.W[:, columns]
+    W = observation.columns(raw.names).W
     fit = solve(raw, settings.options.get("rank_tolerance"))
     E = (observation.Y - W @ fit.X).reshape(n, N)
     Omega = E @ E.T / max(N - fit.rank / n, 1)

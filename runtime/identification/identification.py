@@ -93,9 +93,10 @@ def identify(
     windows = study.validate.split or halves(*observation.span)
     validation = [split_validation(observation, windows, study.estimate, essential=reduced.names, model=model)]
     if further:
-        others = dict(zip(record_names(further), (observed([record], windows=()) for record in further), strict=True))
-        fitted = ", ".join(record_names(records))
-        validation.append(cross_validation(observation, others, study.estimate, essential=reduced.names, name=fitted, model=model))
+        names = record_names([*records, *further])
+        fitted, others = ", ".join(names[: len(records)]), names[len(records) :]
+        parts = {name: observed([record], windows=()) for name, record in zip(others, further, strict=True)}
+        validation.append(cross_validation(observation, parts, study.estimate, essential=reduced.names, name=fitted, model=model))
     comparison = direct_comparison(observation.first_rows, reduced.estimate if linear else fit)
     result = Identification(
         model=model,

@@ -234,12 +234,12 @@ def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]
     """By threshold: number of parameters, and what differs from the set used."""
     steps = [*essential.trail, *essential.further]
     names = essential.all_parameters.names
-    found = []
+    by_threshold = []
     for threshold, count in essential.counts.items():
         gone = [step.name for step in steps[: len(names) - count]]
         differs = [f"-{name}" for name in gone if name in essential.names] + [f"+{name}" for name in essential.removed if name not in gone]
-        found.append((threshold, count, tuple(differs)))
-    return tuple(found)
+        by_threshold.append((threshold, count, tuple(differs)))
+    return tuple(by_threshold)
 
 
 def _solved(gram: Array) -> Array:

@@ -153,11 +153,11 @@ def cross_validation(
     predictions = []
     labels: tuple[str, ...] = ()
     for columns, names in choices.items():
-        found = estimate_of(fit, replace(settings, columns=names), model=model)
-        labels = tuple(joint.joint for joint in found.per_joint)
+        estimate = estimate_of(fit, replace(settings, columns=names), model=model)
+        labels = tuple(joint.joint for joint in estimate.per_joint)
         for part, observation in {name: fit, **predict}.items():
-            total, errors = prediction_errors(observation, found)
-            predictions.append(Prediction(part, columns, len(found.names), observation is fit, total, errors))
+            total, errors = prediction_errors(observation, estimate)
+            predictions.append(Prediction(part, columns, len(estimate.names), observation is fit, total, errors))
     return CrossValidation(labels, tuple(predictions))
 
 

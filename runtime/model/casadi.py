@@ -1,8 +1,8 @@
-"""The CasADi module of a model at the border: found beside the NumPy module, checked, and of the same robot file.
+"""The CasADi module of a model at the border: of the same robot file as the NumPy module beside which it stands, and checked.
 
     symbolic = load_symbolic("tx40")        # generated/tx40_casadi.py
 
-It is parsed before it runs (`runtime.model.loading`) and imports casadi itself; nothing here does.
+It is parsed before it runs (`runtime.model.loading`) and imports casadi itself; this file does not.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """C files compiled on first use into a cache that is checked.
 
 The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder (`SYMGEN_CACHE`, else that of the platform). Its name
-holds the SHA-256 of source, flags, compiler and processor, and that of its own bytes, so that a damaged file is seen before it is loaded; it is
+holds the SHA-256 of source, flags, compiler and processor, and that of its own bytes, so that a damaged file is not loaded; it is
 written under another name and moved, so that processes may compile at once.
 """
 
@@ -52,7 +52,22 @@ def shared_object(
 ) -> ctypes.CDLL:
     """The shared object of a C file, from the cache or compiled; one that does not open is compiled again, once.
 
-    text : what the file holds.   opened : loads and checks an object; raises NotCompiledError or OSError where it is not the one wanted.
+    Parameters
+    ----------
+    path : Path
+        Of the C file, for its name.
+    text : bytes
+        What the file holds.
+    folder : Path
+        The cache.
+    opened : callable
+        Loads and checks an object; raises NotCompiledError or OSError where it is not the one wanted.
+    flags : sequence of str
+
+    Raises
+    ------
+    NotCompiledError
+        No compiler, or one that fails; or a cache that cannot be used.
     """
     command, version = compiler()
     flags = (*flags, *_width())
@@ -69,13 +84,13 @@ def shared_object(
 
 def _cached(folder: Path, key: str, opened: Callable[[Path], ctypes.CDLL]) -> ctypes.CDLL | None:
     """The object of that key; files that are damaged or do not open are removed."""
-    for found in sorted(folder.glob(f"{key}-*.so")):
-        if hashlib.sha256(found.read_bytes()).hexdigest()[:32] == found.stem.partition("-")[2]:
+    for path in sorted(folder.glob(f"{key}-*.so")):
+        if hashlib.sha256(path.read_bytes()).hexdigest()[:32] == path.stem.partition("-")[2]:
             try:
-                return opened(found)
+                return opened(path)
             except (NotCompiledError, OSError):
                 pass
-        found.unlink(missing_ok=True)
+        path.unlink(missing_ok=True)
     return None
 
 

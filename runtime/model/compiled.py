@@ -50,12 +50,18 @@ class DynamicModel(GeneratedModel, Protocol):
 def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None) -> GeneratedModel:
     """`model` with its functions in C, or `model` itself, with a FallbackWarning saying why, where that cannot be had.
 
-    source : the C file; default: beside the file of the model, .c for .py.   cache : folder of the compiled objects.
+    Parameters
+    ----------
+    model : GeneratedModel
+    source : Path, optional
+        The C file; default: beside the file of the model, .c for .py.
+    cache : Path, optional
+        Folder of the compiled objects; default: `compile_cache.cache_folder`.
     """
     try:
         path = source or _beside(model)
         text = _text(path)
-        library = shared_object(path, text, cache or cache_folder(), lambda found: _opened(found, model))
+        library = shared_object(path, text, cache or cache_folder(), lambda opened: _opened(opened, model))
         compiled = CompiledModel(cast(DynamicModel, model), library, text)
         compiled.check()
         return cast(GeneratedModel, compiled)
@@ -73,12 +79,20 @@ def target_of(model: GeneratedModel) -> str:
 class SignalTable:
     """The distinct rows of the store S, shape (b, n, N), as a C function, for other C code: S[column, row] = sign U[signal].
 
-    address : of int32_t f(int64_t m, const double *q, const double *qd, const double *qdd, int64_t stride, const double *constants,
+    Attributes
+    ----------
+    address : int
+        Of int32_t f(int64_t m, const double *q, const double *qd, const double *qdd, int64_t stride, const double *constants,
         double *U, int64_t ustride), which fills U[s*ustride + t], t < m, from states of which joint j has m samples from j*stride on and
         returns 0, or 1 if a pointer is missing or m exceeds ustride. It allocates nothing and may run in many threads.
-    count : number of signals s; those of constant entries are filled too.   tile : samples treated together; m costs as the next multiple.
-    column, row, signal, sign : (entries,), base parameter, joint, signal and +1 or -1 of every entry that is not zero.
-    constant : (entries,), whether no state changes the entry.
+    count : int
+        Number of signals s; those of constant entries are filled too.
+    tile : int
+        Samples treated together; m costs as the next multiple.
+    column, row, signal, sign : ndarray, shape (entries,)
+        Base parameter, joint, signal and +1 or -1 of every entry that is not zero.
+    constant : ndarray of bool, shape (entries,)
+        Whether no state changes the entry.
     """
 
     address: int
@@ -147,8 +161,8 @@ class CompiledModel:
         X = rng.uniform(-1, 1, self._b)
         for name, used in STATES.items():
             arguments = [*states[: len(used)], *([] if name == "regressor" else [X])]
-            found, expected = (getattr(m, name)(*arguments) for m in (self, self._model))
-            if not np.abs(found - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
+            result, expected = (getattr(m, name)(*arguments) for m in (self, self._model))
+            if not np.abs(result - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
                 raise NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
 
     def _filled_store(self, q: Array, qd: Array, qdd: Array, out: Array | None, constants: Mapping[str, float]) -> Array:

@@ -1,4 +1,4 @@
-"""The border to emitted modules: what they offer, how one is found and checked, and checks of the states given to it.
+"""The border to emitted modules: their functions, loading and checking one, and checks of the states given to it.
 
 A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` reads generated/tx40.py of the current folder. A
 module given by path is parsed before it runs (`runtime.model.loading`), so that a file received from elsewhere cannot act behind its formulas.

@@ -5,7 +5,7 @@
     tau   = g sat(u), u of this tick or of the one before, in steps of the converter, held until the next tick
     q, qd = Runge-Kutta of order 4 in equal substeps (or CVODES), cut where a slip stops (`runtime.motion.dry_friction`)
 
-State of a tick: q, qd, the two last positions seen, I, and u. What changes from run to run is an input, so that one compilation serves them all.
+State of a tick: q, qd, the last two positions shown, I, and u. What changes from run to run is an input, so that one compilation serves them all.
 """
 
 from __future__ import annotations

@@ -134,7 +134,7 @@ def rest_function(friction: DryFriction, columns: int = 1) -> Any:
 def event_function(friction: DryFriction) -> Any:
     """The part of a step until the first slip changes its sign.
 
-    (q, qd, qdd, q1, qd1, h, direction, whole) -> q, qd there, what is left of h, slips that are zero there. The slip is taken as quadratic over the
+    (q, qd, qdd, q1, qd1, h, direction, whole) -> q, qd at the end of the part, what is left of h, slips that are zero at that end. The slip is taken as quadratic over the
     step; `whole` = 1 keeps the whole step whatever changes its sign.
     """
     m, n = friction.G.shape

@@ -1,4 +1,4 @@
-"""What a controller follows: q_r, qd_r, qdd_r at its rate, from samples, a motion by coefficients, a record, or random points.
+"""References of a controller: q_r, qd_r, qdd_r at its rate, from samples, a motion by coefficients, a record, or random points.
 
 reference = Reference.sampled(q_r, rate=1000)                    # derivatives by central differences
 reference = Reference(rate, q, qd, qdd)
@@ -34,7 +34,13 @@ UNITS = {"q": "", "qd": "/s", "qdd": "/s^2"}
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """q, qd, qdd of shape (N, n), rad or m and s, at the instants k/rate.   rate : Hz."""
+    """Positions, velocities and accelerations at the instants k/rate.
+
+    Attributes
+    ----------
+    rate : float, Hz
+    q, qd, qdd : ndarray, shape (N, n), rad or m, and s
+    """
 
     rate: float
     q: Array
@@ -66,31 +72,46 @@ class Reference:
         return len(self.q)
 
 
-def reference_of(controller: Controller, model: GeneratedModel, *, records: Sequence[Record] = (), folder: Path | None = None) -> Reference:
+def reference_of(
+    controller: Controller, model: GeneratedModel, *, records: Sequence[Record] = (), folder: str | Path | None = None
+) -> Reference:
     """The reference that the settings describe, within the limits of the robot unless they are to be ignored.
 
-    records : those of the study, for `record`.   folder : where the file name starts; default: the current folder.
+    Parameters
+    ----------
+    controller : Controller
+    model : GeneratedModel
+    records : sequence of Record
+        Those of the study, for the setting `record`.
+    folder : str or Path, optional
+        Where the file name starts; default: the current folder.
+
+    Raises
+    ------
+    SettingsError
+        No reference, or one that does not fit the robot or the controller.
+    InputError
+        A file that does not hold it, or a value outside the limits, with joint and instant.
     """
     settings, rate, n = controller.reference, controller.rate, len(model.JOINTS)
     if settings.file is not None:
-        found = read_reference((folder or Path()) / settings.file, rate, n)
+        reference = read_reference(Path(folder or "") / settings.file, rate, n)
     elif settings.record is not None:
-        found = _of_record(records, settings.record, rate)
+        reference = _of_record(records, settings.record, rate)
     elif settings.motion is not None:
         motion = motion_from_mapping(settings.motion)
         _check_length(motion.duration, rate, "motion")
-        _, q, qd, qdd = motion.sampled(rate)
-        found = Reference(rate, q, qd, qdd)
+        reference = Reference(rate, *motion.sampled(rate)[1:])
     elif settings.points is not None:
         _check_length(settings.points.duration, rate, "points")
-        found = point_to_point(model, settings.points, rate)
+        reference = point_to_point(model, settings.points, rate)
     else:
         raise SettingsError("nothing to follow; give one of file, record, motion, points", path=("controller", "reference"))
-    if found.q.shape[1] != n:
-        raise SettingsError(f"reference of {found.q.shape[1]} joints; {model.NAME} has {n}", path=("controller", "reference"))
+    if reference.q.shape[1] != n:
+        raise SettingsError(f"reference of {reference.q.shape[1]} joints; {model.NAME} has {n}", path=("controller", "reference"))
     if settings.limits == "refuse":
-        check_limits(found, model.LIMITS, model.JOINTS)
-    return found
+        check_limits(reference, model.LIMITS, model.JOINTS)
+    return reference
 
 
 def _check_length(duration: float, rate: float, key: str) -> None:
@@ -99,17 +120,17 @@ def _check_length(duration: float, rate: float, key: str) -> None:
 
 
 def read_reference(path: Path, rate: float, n: int) -> Reference:
-    """Columns q1 ... qn and, where they are there, qd1 ..., qdd1 ... of a file at `rate`, Hz."""
+    """Columns q1 ... qn and, where the file has them, qd1 ..., qdd1 ... of a file at `rate`, Hz."""
     table = open_table(path)
     names = {x: [f"{x}{j}" for j in range(1, n + 1)] for x in UNITS}
     if missing := [name for name in names["q"] if name not in table.names]:
         raise InputError(f"no column {', '.join(missing)} among {', '.join(table.names)}; expected q1 ... q{n}", file=path.name)
     if "t" in table.names:
         t = table.read([["t"]])[0][:, 0]
-        found = (len(t) - 1) / (t[-1] - t[0])
-        if abs(found / rate - 1) > RATE_TOLERANCE:
+        own = (len(t) - 1) / (t[-1] - t[0])
+        if abs(own / rate - 1) > RATE_TOLERANCE:
             raise InputError(
-                f"time runs at {found:g} Hz; the controller at {rate:g} Hz: resample one, or set controller.rate", file=path.name
+                f"time runs at {own:g} Hz; the controller at {rate:g} Hz: resample one, or set controller.rate", file=path.name
             )
     plain = Reference.sampled(table.read([names["q"]])[0], rate)
     if not all(name in table.names for name in (*names["qd"], *names["qdd"])):
@@ -164,18 +185,18 @@ def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Refe
     N = round(settings.duration * rate)
     t = np.arange(N) / rate
     q, qd, qdd = (np.zeros((N, len(model.JOINTS))) for _ in range(3))
-    start, here = 0.0, centre
+    start, begin = 0.0, centre
     while start < settings.duration:
-        there = centre + reach * rng.uniform(-1, 1, len(centre))
-        way = there - here
+        end = centre + reach * rng.uniform(-1, 1, len(centre))
+        way = end - begin
         # velocity way/(T (1 - RAMP)); a ramp 3 x**2 - 2 x**3 has the largest slope 1.5
         T = max(np.max(np.abs(way) / speed) / (1 - RAMP), np.sqrt(np.max(np.abs(way) / acceleration) * 1.5 / (RAMP * (1 - RAMP))))
         if start and start + T > settings.duration:
             break
         piece = (t >= start) & (t < start + T)
         s, v, a = _unit_piece((t[piece] - start) / T)
-        q[piece], qd[piece], qdd[piece] = here + s[:, None] * way, v[:, None] * way / T, a[:, None] * way / T**2
-        start, here = start + T, there
+        q[piece], qd[piece], qdd[piece] = begin + s[:, None] * way, v[:, None] * way / T, a[:, None] * way / T**2
+        start, begin = start + T, end
     moved = t < start
     return Reference(rate, q[moved], qd[moved], qdd[moved])
 

@@ -48,7 +48,16 @@ FAR = 1e3  # times the range of the reference, plus 1 rad or m: the loop has lef
 class Simulator:
     """The closed loop of one robot and one controller, ready for many runs.
 
-    constants : geometry and gravity that replace those of the robot file.   in_c : compile where there is a compiler.
+    Parameters
+    ----------
+    model : GeneratedModel
+    controller : Controller
+    symbolic : SymbolicModel, optional
+        CasADi model of the same robot; default: the file beside that of `model`.
+    constants : mapping, optional
+        Geometry and gravity that replace those of the robot file.
+    in_c : bool
+        Compile where there is a compiler.
     """
 
     def __init__(
@@ -85,11 +94,32 @@ class Simulator:
         seed: int | None = None,
         name: str = "simulation",
     ) -> Simulation:
-        """The arm with base parameters X (b,) along the reference.
+        """The arm along the reference.
 
-        g : factor on everything between position error and torque, (n,).   start : joint positions at t = 0, at rest.
-        ideal : no noise, no steps of encoder and converter.   disturbance : torques on the arm that are not recorded, (N, n).
-        feedforward : torques added to the command, (N, n), in place of those of the settings.   seed : of the noise; default: that of the settings.
+        Parameters
+        ----------
+        X : ndarray, shape (b,)
+            Base parameters.
+        reference : Reference
+        g : ndarray, shape (n,), or float
+            Factor on everything between position error and torque.
+        start : ndarray, shape (n,), optional, rad or m
+            Joint positions at t = 0, at rest; default: those of the settings, else the first of the reference.
+        ideal : bool
+            No noise, no steps of encoder and converter.
+        disturbance : ndarray, shape (N, n), optional, N m or N
+            Torques on the arm that are not recorded.
+        feedforward : ndarray, shape (N, n), optional, N m or N
+            Torques added to the command, in place of those of the settings.
+        seed : int, optional
+            Of the noise; default: that of the settings.
+        name : str
+            Of the record.
+
+        Raises
+        ------
+        SimulationError
+            An inertia that is not positive definite, a loop that is not stable, or a motion that is lost.
         """
         seed = self.controller.seed if seed is None else seed
         inputs = self._inputs(X, reference, g, start, disturbance, feedforward, None if ideal else seed)

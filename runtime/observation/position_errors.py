@@ -62,7 +62,7 @@ class Normal:
 class Perturbation:
     """One record under position errors.
 
-    seen : the unperturbed rows; torque : Y before rows are left out, shape (n, K).   clean : their normal equations.   smooth : by encoder, what errors of variance 1 add to them, switching columns left out.
+    observation : the unperturbed rows; torque : Y before rows are left out, shape (n, K).   clean : their normal equations.   smooth : by encoder, what errors of variance 1 add to them, switching columns left out.
     errors : by encoder, ndarray, shape (n, b, b), E[dW_j'dW_j] alone.
     speeds : by encoder, ndarray, shape (n, b, K): sensitivity of the rows to dqd of that encoder, times the root of its variance.
     root : ndarray, shape (n, encoders), joint position error per encoder error.
@@ -70,7 +70,7 @@ class Perturbation:
     used : bool, shape (n, N), instants of the window nearest to a row that is used.   known : switches computed so far.
     """
 
-    seen: Observation
+    observation: Observation
     torque: Array
     selection: Selection
     along: Mapping[int, Array]
@@ -87,12 +87,12 @@ class Perturbation:
 
     def expected(self, variance: float, encoders: Sequence[int]) -> Normal:
         """Expected normal equations with errors of that variance on the encoders named (from 0), the others exact."""
-        found = self.clean
+        normal = self.clean
         for i in encoders:
-            found = found + Normal(variance * self.smooth[i].G, variance * self.smooth[i].g)
+            normal = normal + Normal(variance * self.smooth[i].G, variance * self.smooth[i].g)
         if not self.switches or variance == 0:
-            return found
-        G, g = found.G.copy(), found.g.copy()
+            return normal
+        G, g = normal.G.copy(), normal.g.copy()
         self._add_switches(G, g, variance, encoders)
         return Normal(G, g)
 
@@ -107,26 +107,26 @@ class Perturbation:
                 sigma = np.sqrt(variance * before) * float(np.linalg.norm(share))
                 acting.append((switch, share, self._at(switch, sigma)))
         for j in range(len(G)):
-            rows, used = self.seen.joint(j), kept[j]
-            here = [(k, scale * share, scale, found) for k, share, scale, found in _on_joint(acting, j)]
-            if not here:
+            rows, used = self.observation.joint(j), kept[j]
+            acting_here = [(k, scale * share, scale, noisy) for k, share, scale, noisy in _on_joint(acting, j)]
+            if not acting_here:
                 continue
-            columns = [k for k, *_ in here]
-            shift = np.array([scale * found.shift[used] for _, _, scale, found in here]).T
-            slopes = [found.slope[used] for *_, found in here]
-            W, Y = self.seen.W[rows], self.seen.Y[rows]
+            columns = [k for k, *_ in acting_here]
+            shift = np.array([scale * noisy.shift[used] for _, _, scale, noisy in acting_here]).T
+            slopes = [noisy.slope[used] for *_, noisy in acting_here]
+            W, Y = self.observation.W[rows], self.observation.Y[rows]
             change = W.T @ shift
             G[j][:, columns] += change
             G[j][columns] += change.T
             G[j][np.ix_(columns, columns)] += shift.T @ shift
             g[j][columns] += shift.T @ Y
-            for a, (k, share, scale, found) in enumerate(here):
-                along = sum(share[m] * (self.speeds[i][j] @ found.slope) for m, i in enumerate(encoders) if share[m])
+            for a, (k, share, scale, noisy) in enumerate(acting_here):
+                along = sum(share[m] * (self.speeds[i][j] @ noisy.slope) for m, i in enumerate(encoders) if share[m])
                 along = np.sqrt(variance * variance / before) * after * along
                 G[j][:, k] += along
                 G[j][k] += along
-                G[j][k, k] += scale**2 * found.variance[j]
-                for c, (other, share_c, *_) in enumerate(here):
+                G[j][k, k] += scale**2 * noisy.variance[j]
+                for c, (other, share_c, *_) in enumerate(acting_here):
                     if c != a:
                         G[j][k, other] += variance * after * (share @ share_c) * float(slopes[a] @ slopes[c])
 
@@ -146,7 +146,7 @@ class Perturbation:
 
 
 def _on_joint(acting: Sequence[tuple[Switch, Array, Switched]], j: int) -> list[tuple[int, Array, float, Switched]]:
-    return [(switch.column, share, float(switch.G[j]), found) for switch, share, found in acting if switch.G[j]]
+    return [(switch.column, share, float(switch.G[j]), noisy) for switch, share, noisy in acting if switch.G[j]]
 
 
 def _used(selection: Selection, N: int) -> Array:
@@ -173,23 +173,26 @@ def perturbation(
     states = filtered_states(record.q, record.rate, signals)
     selection = select_rows(record, states.qd, signals, study.rows)
     torque = decimated_torque(record.tau, selection)
-    seen = observation_from_states(model, states, torque, selection, files=record.files, columns=names, constants=constants)
-    found = switches(model, names)
+    observation = observation_from_states(model, states, torque, selection, files=record.files, columns=names, constants=constants)
+    switching = switches(model, names)
     window = states[selection.samples]
     root = encoder_root(model, study, drives)
-    smooth, errors, speeds = _smooth(model, window, selection, seen, band, root, found, dict(constants or {}))
+    smooth, errors, speeds = _smooth(model, window, selection, observation, band, root, switching, dict(constants or {}))
     return Perturbation(
-        seen=seen,
+        observation=observation,
         torque=torque,
         selection=selection,
-        along={switch.column: window.qd @ switch.G for switch in found},
+        along={switch.column: window.qd @ switch.G for switch in switching},
         band=band,
         root=root,
-        clean=_normal([seen.W[seen.joint(j)] for j in range(seen.n)], [seen.Y[seen.joint(j)] for j in range(seen.n)]),
+        clean=_normal(
+            [observation.W[observation.joint(j)] for j in range(observation.n)],
+            [observation.Y[observation.joint(j)] for j in range(observation.n)],
+        ),
         smooth=smooth,
         errors=errors,
         speeds=speeds,
-        switches=found,
+        switches=switching,
         kernels=kernels(band, len(window), selection.factor),
         used=_used(selection, len(window)),
     )
@@ -229,16 +232,16 @@ def _smooth(
     model: GeneratedModel,
     window: States,
     selection: Selection,
-    seen: Observation,
+    observation: Observation,
     band: Bandwidth,
     root: Array,
-    found: Sequence[Switch],
+    switching: Sequence[Switch],
     constants: Mapping[str, float],
 ) -> tuple[tuple[Normal, ...], tuple[Array, ...], tuple[Array, ...]]:
     """Per encoder: what errors of variance 1 add to the normal equations, E[dW'dW] of it, and the sensitivities to the speed."""
     kept = States(window.q[selection.kept], window.qd[selection.kept], window.qdd[selection.kept])
-    columns = np.array([model.BASE_PARAMETERS.index(name) for name in seen.names])
-    rigid = np.array(model.STRUCTURE)[columns].T & ~np.isin(np.arange(len(columns)), [s.column for s in found])
+    columns = np.array([model.BASE_PARAMETERS.index(name) for name in observation.names])
+    rigid = np.array(model.STRUCTURE)[columns].T & ~np.isin(np.arange(len(columns)), [s.column for s in switching])
     axes = np.linalg.cholesky(band.before)
     into = np.linalg.inv(axes)
     C = np.linalg.cholesky(into @ band.after @ into.T)
@@ -260,7 +263,7 @@ def _smooth(
             first.append((up - down) / (2 * h))
             second += (up - 2 * at_rest + down) / (2 * h**2)
         squares = _squares(selection, np.array(first), C, rigid)
-        shifted = _shifted(seen, selection, band.gain * second, rigid)
+        shifted = _shifted(observation, selection, band.gain * second, rigid)
         smooth.append(Normal(squares + shifted.G, shifted.g))
         errors.append(squares)
         speeds.append(np.where(rigid.T[:, :, None], first[1], 0.0).transpose(1, 0, 2) * selection.mask[:, None, :])
@@ -278,17 +281,17 @@ def _squares(selection: Selection, first: Array, C: Array, rigid: Array) -> Arra
     return G
 
 
-def _shifted(seen: Observation, selection: Selection, second: Array, rigid: Array) -> Normal:
+def _shifted(observation: Observation, selection: Selection, second: Array, rigid: Array) -> Normal:
     """W'E[dW] + E[dW]'W and E[dW]'Y by joint; second = E[dW], shape (b, n, K)."""
     n, b = rigid.shape
     G, g = np.zeros((n, b, b)), np.zeros((n, b))
     for j in range(n):
         columns, used = np.flatnonzero(rigid[j]), selection.mask[j]
         B = second[columns, j][:, used]
-        change = B @ seen.W[seen.joint(j)]
+        change = B @ observation.W[observation.joint(j)]
         G[j][columns] += change
         G[j][:, columns] += change.T
-        g[j][columns] = B @ seen.Y[seen.joint(j)]
+        g[j][columns] = B @ observation.Y[observation.joint(j)]
     return Normal(G, g)
 
 

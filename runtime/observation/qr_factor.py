@@ -77,6 +77,13 @@ class Factor:
     R: Array
     joints: tuple[JointFactor, ...]
 
+    @classmethod
+    def of(cls, names: Sequence[str], joints: Sequence[JointFactor]) -> Factor:
+        """The factor of the stacked factors of all joints."""
+        b = len(names)
+        R = triangularise(np.vstack([joint.spread(b) for joint in joints])) if joints else np.zeros((b + 1, b + 1))
+        return cls(tuple(names), R, tuple(joints))
+
     @property
     def rows(self) -> int:
         """Number of rows r of W."""
@@ -99,8 +106,7 @@ class Factor:
 
     def weighted(self, weights: Sequence[float] | Array) -> Factor:
         """The factor after multiplying the rows of joint j by weights[j]."""
-        scaled = tuple(replace(joint, R=joint.R * w) for joint, w in zip(self.joints, weights, strict=True))
-        return Factor(self.names, stacked(scaled, len(self.names)), scaled)
+        return Factor.of(self.names, [replace(joint, R=joint.R * w) for joint, w in zip(self.joints, weights, strict=True)])
 
     def select(self, names: Sequence[str]) -> Factor:
         """The factor of the columns `names` (in that order) and Y, from the small factors alone."""
@@ -128,14 +134,9 @@ class Factor:
 def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
     """The columns at the positions `kept` of the Factor, numbered in that order."""
     place = {int(column): position for position, column in enumerate(joint.columns)}
-    found = [(new, place[old]) for new, old in enumerate(kept) if old in place]
-    columns = np.array([new for new, _ in found], dtype=np.intp)
-    return replace(joint, columns=columns, R=joint.R[:, [*(position for _, position in found), joint.R.shape[1] - 1]])
-
-
-def stacked(joints: Sequence[JointFactor], b: int) -> Array:
-    """R, shape (b + 1, b + 1), of the stacked factors of all joints."""
-    return triangularise(np.vstack([joint.spread(b) for joint in joints])) if joints else np.zeros((b + 1, b + 1))
+    places = [(new, place[old]) for new, old in enumerate(kept) if old in place]
+    columns = np.array([new for new, _ in places], dtype=np.intp)
+    return replace(joint, columns=columns, R=joint.R[:, [*(position for _, position in places), joint.R.shape[1] - 1]])
 
 
 def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Factor:
@@ -161,18 +162,4 @@ def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Fac
         R_j = np.asarray(np.linalg.qr(np.column_stack([W_j[:, columns], Y_j]), mode="r"))
         joints.append(JointFactor(columns, R_j, count))
         start += count
-    return Factor(tuple(names), stacked(joints, b), tuple(joints))
-
-
-def combine(parts: Sequence[Factor]) -> Factor:
-    """Factor of several records of one robot stacked row by row; every part has the same names and joints."""
-    first = parts[0]
-    if any(part.names != first.names or len(part.joints) != len(first.joints) for part in parts):
-        raise ValueError("factors can be combined when their names and their number of joints agree")
-    b = len(first.names)
-    joints = []
-    for same in zip(*(part.joints for part in parts), strict=True):
-        R = stacked(same, b)
-        columns = np.flatnonzero(R[:, :-1].any(axis=0))
-        joints.append(JointFactor(columns, R[:, [*columns, b]], sum(joint.rows for joint in same)))
-    return Factor(first.names, stacked(joints, b), tuple(joints))
+    return Factor.of(names, joints)

@@ -1,6 +1,6 @@
 """The columns of W, decimated: only the entries of the regressor that are not identically zero, and equal ones once.
 
-Most entries of W are structurally zero or repeat each other up to the sign (TX40: 135 signals of 360 entries), and decimation is linear: filter
+Most entries of W are structurally zero or repeat each other up to the sign, and decimation is linear: filter
 the signals, then place them. The regressor is evaluated in blocks on one reused store and decimated block by block: the signals are not stored.
 """
 
@@ -85,24 +85,11 @@ class DecimatedSignals:
     def __call__(self, states: States) -> Array:
         """Signals of the states (N, n) of the window, shape (S, K)."""
         if self.decimation is None:
-            return signals_in_blocks(self.signals, states)
+            blocks = [self.signals(states[t0 : t0 + BLOCK]).copy() for t0 in range(0, len(states), BLOCK)]
+            return np.concatenate(blocks, axis=1)
         for t0, t1 in self.decimation.plan.pieces(BLOCK):
             self.decimation.take(self.signals(states[t0:t1]), t0)
         return self.decimation.result()
-
-
-def signals_of(model: GeneratedModel, states: States, entries: Entries, constants: Mapping[str, float]) -> Array:
-    """The distinct signals of the regressor, shape (S, N)."""
-    return signals_in_blocks(DistinctSignals(model, entries, constants), states)
-
-
-def signals_in_blocks(signals: DistinctSignals, states: States) -> Array:
-    """The signals of all states, shape (S, N), evaluated block by block."""
-    N = len(states)
-    result = np.empty((len(signals.rows), N))
-    for t0 in range(0, N, BLOCK):
-        result[:, t0 : t0 + BLOCK] = signals(states[t0 : t0 + BLOCK])
-    return result
 
 
 def distinct_entries(model: GeneratedModel, constants: Mapping[str, float], columns: Array | None = None) -> Entries:

@@ -91,7 +91,7 @@ def switches(model: GeneratedModel, names: Sequence[str]) -> tuple[Switch, ...]:
     elements = getattr(model, "ELEMENTS", None)
     if elements is None:
         raise ModelError("no ELEMENTS, which say what friction acts along; emit the model again", file=model.NAME)
-    found = []
+    switching = []
     for column, name in enumerate(names):
         element = elements.get(name, elements.get(name.removesuffix("R")))
         if element is None:
@@ -104,8 +104,8 @@ def switches(model: GeneratedModel, names: Sequence[str]) -> tuple[Switch, ...]:
         if strange:
             raise ModelError(f"{name} acts along {strange}, which are no actuated joints; no prediction is made for it", file=model.NAME)
         G = np.array([along.get(j, 0.0) for j in model.JOINTS])
-        found.append(Switch(column, G, *shape))
-    return tuple(found)
+        switching.append(Switch(column, G, *shape))
+    return tuple(switching)
 
 
 def _shape(kind: str, direction: str) -> tuple[float, float, float] | None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.observation.qr_factor import Factor, factor, selected, stacked
+from runtime.observation.qr_factor import Factor, factor, selected
 from runtime.observation.segments import Segment, Window, merged
 
 Array = np.ndarray
@@ -148,11 +148,12 @@ class Observation:
         """Triangular factor of [W Y], joint by joint; made once."""
         if self.reduced is None:
             return factor(self.W, self.Y, self.rows, self.names)
-        joints = merged(s.joints for s in self.reduced.segments)
-        return Factor(self.names, stacked(joints, len(self.names)), joints)
+        return Factor.of(self.names, merged(s.joints for s in self.reduced.segments))
 
     def columns(self, names: Sequence[str]) -> Observation:
         """The same rows with the named columns alone, in the order given."""
+        if tuple(names) == self.names:
+            return self
         kept = column_numbers(names, self.names)
         errors = None if self.errors is None else self.errors[:, kept][:, :, kept]
         reduced = self.reduced

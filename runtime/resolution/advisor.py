@@ -143,8 +143,8 @@ def advise(
     names = study_columns(model, records, study, columns, constants)
     parts = tuple(perturbation(model, record, study, names, drives=drives, constants=constants) for record in records)
     settings = replace(study.estimate, columns="all")
-    seen = stack([part.seen for part in parts]) if len(parts) > 1 else parts[0].seen
-    system = linear_system(seen, settings)
+    measured = stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
+    system = linear_system(measured, settings)
     reference = assemble(system, system.solve(), model=model, provenance=provenance)
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[study.cestac.rounding])
     decisive = [names.index(name) for name in deciding_names(reference)]
@@ -172,7 +172,7 @@ def advise(
         torque_sigma=torque_sigma(predictor, drives or _drives(model)),
         assumptions=assumptions(study, records, parts, reference),
         settings={
-            **seen.settings,
+            **measured.settings,
             "estimate": to_mapping(study.estimate),
             "cestac": to_mapping(study.cestac),
             "rate": [record.rate for record in records],
@@ -274,14 +274,14 @@ def confirmed(advice: EncoderAdvice, reference: Estimate, level: Callable[[float
 
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
     """Deviation of X, shape (b,), per unit deviation of white noise of every motor torque."""
-    n = predictor.parts[0].seen.n
+    n = predictor.parts[0].observation.n
     R = np.eye(n) if drives is None else drives.ratio
     w = predictor.weights
     middle, A = 0.0, 0.0
     for part in predictor.parts:
-        b = len(part.seen.names)
+        b = len(part.observation.names)
         full = np.zeros((n, len(part.selection.kept), b))
-        full[part.selection.mask] = part.seen.W
+        full[part.selection.mask] = part.observation.W
         Omega = R.T @ R * part.band.gain**2 / part.selection.factor
         middle = middle + np.einsum("i,j,ij,iKa,jKb->ab", w**2, w**2, Omega, full, full, optimize=True)
         A = A + np.einsum("j,jab->ab", w**2, part.clean.G)

@@ -32,19 +32,38 @@ STUDY, UNFINISHED = "study.json", ".unfinished"
 
 
 class Checkpoint:
-    """The runs of one study in FOLDER/runs; nothing is written before the first `every` seconds, or `flush`."""
+    """The runs of one study in FOLDER/runs; nothing is written before the first `every` seconds, or `flush`.
 
-    def __init__(self, folder: Path, *, every: float = EVERY, clock: Callable[[], float] = monotonic) -> None:
-        self.folder, self.every, self.clock = folder / FOLDER, every, clock
+    Parameters
+    ----------
+    folder : str or Path
+    every : float, s
+        Between two archives.
+    clock : callable
+        Time, s.
+    """
+
+    def __init__(self, folder: str | Path, *, every: float = EVERY, clock: Callable[[], float] = monotonic) -> None:
+        self.folder, self.every, self.clock = Path(folder) / FOLDER, every, clock
         self.written = 0  # runs on disk
         self._identity: Mapping[str, Any] = {}
         self._new: list[Runs] = []
         self._last = clock()
 
     def resume(self, identity: Mapping[str, Any], b: int) -> Runs:
-        """The runs that an earlier, interrupted study left; InputError where it was another one, or a file is damaged.
+        """The runs that an earlier, interrupted study left.
 
-        identity : JSON values that tell studies apart.   b : parameters of a run.
+        Parameters
+        ----------
+        identity : mapping
+            JSON values that tell studies apart.
+        b : int
+            Parameters of a run.
+
+        Raises
+        ------
+        InputError
+            The runs are those of another study, or a file is damaged.
         """
         self._identity, self._last = json.loads(json.dumps(identity)), self.clock()
         for left in self.folder.glob(f"*{UNFINISHED}"):
@@ -52,9 +71,9 @@ class Checkpoint:
         if not (self.folder / STUDY).is_file():
             return Runs.of((), b)
         self._compare(_json(self.folder / STUDY))
-        found = Runs.joined([_read(path, b) for path in self._archives()], b)
-        self.written = len(found)
-        return found
+        runs = Runs.joined([_read(path, b) for path in self._archives()], b)
+        self.written = len(runs)
+        return runs
 
     def add(self, runs: Runs) -> None:
         """Take new runs; write them when it is time."""
@@ -78,13 +97,13 @@ class Checkpoint:
         self._new, self._last = [], self.clock()
 
     def remove(self) -> None:
-        """Delete the archives, when their runs are told elsewhere."""
+        """Delete the archives, once other files hold their runs."""
         for path in [*self._archives(), self.folder / STUDY]:
             path.unlink(missing_ok=True)
         self._leave_no_empty_folder()
 
     def _leave_no_empty_folder(self) -> None:
-        with suppress(OSError):  # not empty, or not there
+        with suppress(OSError):  # not empty, or missing
             self.folder.rmdir()
 
     def _archives(self) -> list[Path]:
@@ -100,8 +119,8 @@ class Checkpoint:
         number = int(archives[-1].stem) + 1 if archives else 0
         _write_whole(self.folder / f"{number:06d}.npz", data.getvalue())
 
-    def _compare(self, found: Mapping[str, Any]) -> None:
-        other = sorted(key for key in {*found, *self._identity} if found.get(key) != self._identity.get(key))
+    def _compare(self, earlier: Mapping[str, Any]) -> None:
+        other = sorted(key for key in {*earlier, *self._identity} if earlier.get(key) != self._identity.get(key))
         if other:
             raise InputError(
                 f"holds runs of another study, {', '.join(other)} differ; use another folder, or delete this one", file=str(self.folder)
@@ -124,12 +143,12 @@ def _write_whole(path: Path, data: bytes) -> None:
 
 def _json(path: Path) -> Mapping[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        study = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as e:
         raise InputError(f"cannot be read ({e}); delete {path.parent} to start again", file=str(path)) from e
-    if not isinstance(found, dict):
+    if not isinstance(study, dict):
         raise InputError(f"not the settings of a study; delete {path.parent} to start again", file=str(path))
-    return found
+    return study
 
 
 def _read(path: Path, b: int) -> Runs:

@@ -11,7 +11,6 @@ module whose sin and cos apply. All but Sinusoids are linear in p. Position, vel
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any
@@ -30,26 +29,26 @@ Terms = Annotated[Whole, Field(ge=1, le=MOST)]
 Corners = Annotated[Whole, Field(ge=2, le=MOST)]
 
 
-class Family(ABC):
-    """A form of motion."""
+class Family:
+    """A form of motion; subclasses are settings."""
 
     @property
-    @abstractmethod
     def duration(self) -> float:
         """Length, s."""
+        raise NotImplementedError
 
     @property
-    @abstractmethod
     def names(self) -> tuple[str, ...]:
         """Names of the coefficients p of a joint."""
+        raise NotImplementedError
 
-    @abstractmethod
     def joint(self, t: Array, p: Any, math: Any) -> States:
         """q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p, shape (P,)."""
+        raise NotImplementedError
 
-    @abstractmethod
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
         """Random coefficients, shape (P,), of a motion about the middle of [lower, upper], no faster than about `speed`."""
+        raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
         """Smallest and largest p, shape (P,) each; infinite where only the motion is limited."""
@@ -161,13 +160,13 @@ class Polyline(Family):
     blend: float
 
     @property
-    @abstractmethod
     def ramps(self) -> list[tuple[float, float]]:
         """Begin and end of the way to each next position, s; corners not rounded."""
+        raise NotImplementedError
 
-    @abstractmethod
     def stride(self, speed: float) -> float:
         """Largest distance between neighbours of a guess, rad or m."""
+        raise NotImplementedError
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -11,9 +11,9 @@ A number may be an arithmetic text (`2*pi/10000`), one value stands for a list o
 
 from __future__ import annotations
 
-from abc import ABCMeta
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, fields
+from numbers import Integral
 from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
@@ -52,6 +52,10 @@ def _number(value: Any) -> Any:
         raise ValueError(f"{e}; expected a number") from None
 
 
+def _whole(value: Any) -> Any:
+    return int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
+
+
 def _text(value: Any) -> Any:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
@@ -66,7 +70,7 @@ Real = Annotated[
 ]
 Positive = Annotated[Real, Field(gt=0)]
 NotNegative = Annotated[Real, Field(ge=0)]
-Whole = Annotated[int, Field(strict=True)]
+Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole)]
 Count = Annotated[Whole, Field(ge=1)]
 Seed = Annotated[Whole, Field(ge=0)]
 Flag = Annotated[bool, Field(strict=True)]
@@ -108,7 +112,7 @@ Interval = Annotated[tuple[Real | None, Real | None], AfterValidator(_in_order)]
 """[t0, t1] in s; null leaves an end open."""
 
 
-class Reporting(ABCMeta):
+class SettingsType(type):
     """Type of settings: values that pydantic refuses become a SettingsError, which names the key and what it expects."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
@@ -116,13 +120,13 @@ class Reporting(ABCMeta):
             return super().__call__(*args, **kwargs)
         except ValidationError as e:
             problem = settings_error(e, {**dict(enumerate(args)), **kwargs})
-            first = [fields(cls)[k].name if isinstance(k, int) else k for k in problem.path[:1]]  # type: ignore[arg-type]
-            raise SettingsError(problem.reason, path=(*first, *problem.path[1:])) from None
+            names: dict[str | int, str | int] = dict(enumerate(f.name for f in fields(cls)))  # type: ignore[arg-type]
+            raise SettingsError(problem.reason, path=tuple(names.get(k, k) for k in problem.path[:1]) + problem.path[1:]) from None
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
 @dataclass(frozen=True, config=CONFIG)
-class Settings(metaclass=Reporting):
+class Settings(metaclass=SettingsType):
     """Base of all settings. A subclass is a frozen dataclass of which only instances with valid values can be made."""
 
     def __init_subclass__(cls) -> None:

@@ -208,7 +208,7 @@ class PayloadSettings(Settings):
     record: Records = ()
     link: Whole | None = None
     frame: Whole | None = None
-    known: Mapping[str, Real] = field(default_factory=dict)
+    known: Mapping[Text, Real] = field(default_factory=dict)
     friction: Flag = False
     gains: Flag = False
 

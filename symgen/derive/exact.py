@@ -16,8 +16,8 @@ Number Theory, 6.4):
 
 pi as a number is a random residue: it is transcendental. A `Number` has its value, or a residue where `geometry` gives one.
 
-Directions of motion: sign(sd) = 2b - 1 with a random field value b for each class of proportional rows G; max(sd, 0) = b sd. A column is
-linear in each b, so an identity that holds for every b in F_p holds for b = 0 and b = 1.
+Directions of motion: sign(sd) = 2b - 1 with b = 1 forward, 0 backward, one b for each class of proportional rows G; max(sd, 0) = b sd. A torque is a
+polynomial of degree one in each b, hence zero for b = 0, 1 if and only if it is the zero polynomial; b is drawn from F_p as every other variable.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from math import gcd, lcm
 
 import numpy as np
 
-from symgen.derive.scalar import Scalar, Turn
+from symgen.derive.scalar import Scalar, Turn, Unnamed
 from symgen.description.expression import Call, Expression, Monomial, Number, call, quarter_turns
 from symgen.description.robot import REVOLUTE, Robot
 
@@ -234,7 +234,7 @@ def _is_prime(n: int) -> bool:
 Point = tuple[Array, Array]  # (cos, sin) over F_p
 
 
-class Draw:
+class Draw(Unnamed):
     """One random robot and `samples` random states over F_p: an Algebra of the derivation.
 
     `geometry` gives residues, shape (count, 1), for constants by name and for half-angle tangents of fixed angles by their unit: `count`
@@ -434,11 +434,3 @@ class Draw:
         if orientation < 0:
             b = 1 - b
         return (b, b * rate) if when == "positive" else (b - 1, (1 - b) * rate)
-
-    def name(self, value: Scalar, name: str) -> Scalar:
-        return value
-
-    hint = name
-
-    def section(self, title: str) -> None:
-        pass

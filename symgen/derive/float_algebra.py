@@ -1,4 +1,4 @@
-"""The algebra of floats: q, qd, qdd of the joints are arrays, constants have the values of the robot file (or others)."""
+"""Algebras of numbers: q, qd, qdd of the joints are given by joint number. In floats, arrays of any one shape; other numbers in subclasses."""
 
 from __future__ import annotations
 
@@ -7,49 +7,77 @@ from typing import Any
 
 import numpy as np
 
-from symgen.derive.scalar import Scalar, Turn
+from symgen.derive.scalar import Scalar, Turn, Unnamed
 from symgen.description.expression import Expression
 from symgen.description.robot import Robot
 
 Array = np.ndarray[Any, Any]
 
 
-class FloatAlgebra:
-    """Scalars are arrays of any one shape: `q`, `qd`, `qdd` give them by joint number."""
+class NumberAlgebra(Unnamed):
+    """States of one kind of numbers.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q, qd, qdd : mapping
+        Position, velocity and acceleration of each joint; rad or m and seconds.
+    rate : mapping
+        dq_u/dq_i of each tied joint u and actuated joint i.
+    """
 
     def __init__(
         self,
         robot: Robot,
-        q: Mapping[int, Array],
-        qd: Mapping[int, Array] | None = None,
-        qdd: Mapping[int, Array] | None = None,
-        rate: Mapping[tuple[int, int], Array] | None = None,
-        constants: Mapping[str, float] | None = None,
+        q: Mapping[int, Any],
+        qd: Mapping[int, Any] | None = None,
+        qdd: Mapping[int, Any] | None = None,
+        rate: Mapping[tuple[int, int], Any] | None = None,
     ) -> None:
         self.robot, self._q, self._qd, self._qdd, self._rate = robot, q, qd or {}, qdd or {}, rate or {}
-        self.constants = {**robot.constants, **(constants or {})}
 
     def constant(self, e: Expression) -> Scalar:
         c = e.constant
-        return int(c) if c is not None and c in (0, 1, -1) else e.value(self.constants)
+        return int(c) if c is not None and c in (0, 1, -1) else self.value(e)
 
-    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
-        angle: Scalar = offset.value(self.constants)
+    def value(self, e: Expression) -> Scalar:
+        """A constant expression as a number."""
+        raise NotImplementedError
+
+    def angle(self, turn: Turn, offset: Expression) -> Scalar:
+        """sum n_j q_j + offset."""
+        total = self.value(offset)
         for j, n in turn:
-            angle = angle + n * self._q[j]
-        return np.cos(angle), np.sin(angle)
+            total = total + n * self._q[j]
+        return total
 
-    def q(self, j: int) -> Array:
+    def q(self, j: int) -> Scalar:
         return self._q[j]
 
-    def qd(self, j: int) -> Array:
+    def qd(self, j: int) -> Scalar:
         return self._qd[j]
 
-    def qdd(self, j: int) -> Array:
+    def qdd(self, j: int) -> Scalar:
         return self._qdd[j]
 
-    def rate(self, u: int, i: int) -> Array:
+    def rate(self, u: int, i: int) -> Scalar:
         return self._rate[u, i]
+
+
+class FloatAlgebra(NumberAlgebra):
+    """Floats; `constants` replace those of the robot file."""
+
+    def __init__(self, robot: Robot, *states: Mapping[Any, Array] | None, constants: Mapping[str, float] | None = None) -> None:
+        super().__init__(robot, *states)  # type: ignore[arg-type]
+        self.constants = {**robot.constants, **(constants or {})}
+
+    def value(self, e: Expression) -> Scalar:
+        return e.value(self.constants)
+
+    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
+        angle = self.angle(turn, offset)
+        return np.cos(angle), np.sin(angle)
 
     def sign(self, rate: Scalar, row: object) -> Scalar:
         return np.sign(rate)
@@ -57,11 +85,3 @@ class FloatAlgebra:
     def one_sided(self, rate: Scalar, row: object, when: str) -> tuple[Scalar, Scalar]:
         limit = np.maximum if when == "positive" else np.minimum
         return limit(np.sign(rate), 0), limit(rate, 0)
-
-    def name(self, value: Scalar, name: str) -> Scalar:
-        return value
-
-    hint = name
-
-    def section(self, title: str) -> None:
-        pass

@@ -1,4 +1,4 @@
-"""Relations of the passive joints: declared ones checked, linear ones found, and the mobility of the mechanism.
+"""Relations of the passive joints: declared ones checked, linear ones derived, and the mobility of the mechanism.
 
 Loop: frame `cut` (one branch) and frame `twin` (sigma 2, other branch) coincide, 0T_cut = 0T_twin. At a numerical solution the passive
 rates are G = -J_u^+ J_a; where G keeps the same whole numbers along a motion, the relation q_u = G q_a + c is linear. It is then
@@ -9,7 +9,7 @@ The second branch of a parallelogram (anti-parallelogram) is not linear and neve
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
@@ -32,15 +32,7 @@ CLOSED = 1e-6  # residual below which two frames coincide
 INDEPENDENT_MOTIONS = 1e-7  # singular values below, relative to the largest and to 1, are no constraint (differences are good to 1e-9)
 
 
-@dataclass(frozen=True)
-class Found:
-    """Linear relations of passive joints in the actuated (and tied) ones; `tied` are the passive joints without one."""
-
-    row: Mapping[int, Mapping[int, Expression]]
-    offset: Mapping[int, Expression]
-    tied: tuple[int, ...]
-    start: Mapping[int, float]
-    """A configuration of all moving joints that closes the loops."""
+Relations = Mapping[int, tuple[Mapping[int, Expression], Expression]]  # {joint: (row, constant)}
 
 
 def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], Expression]]:
@@ -63,7 +55,7 @@ def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], E
 class LoopEquations:
     """Closure of all loops in the moving joints that no constraint gives, by numbers."""
 
-    def __init__(self, robot: Robot, relations: Mapping[int, tuple[Mapping[int, Expression], Expression]]) -> None:
+    def __init__(self, robot: Robot, relations: Relations) -> None:
         self.robot = robot
         self.free = tuple(j for j in robot.moving if j not in relations)
         self.active = tuple(j for j in self.free if j in robot.joints)
@@ -159,8 +151,8 @@ def _rank(J: Array) -> int:
     return int(np.sum(s > INDEPENDENT_MOTIONS * max(float(s[0]), 1.0)))
 
 
-def find_relations(robot: Robot) -> Found:
-    """Check the declared relations and find the linear ones of the remaining passive joints."""
+def find_relations(robot: Robot) -> Closure:
+    """The closure of a robot with passive joints: declared relations checked, linear ones of the other passive joints derived."""
     relations = declared_relations(robot)
     equations = LoopEquations(robot, relations)
     in_loops = {j for loop in robot.loops for k in (loop.cut, loop.twin) for j in robot.path(k)}
@@ -182,34 +174,32 @@ def find_relations(robot: Robot) -> Found:
             continue
         _check_mobility(robot, equations, q)
         general = q if general is None else general
-        found = _linear(robot, equations, relations, q)
-        if found is not None:
-            return found
+        linear = _linear(robot, equations, relations, q)
+        if linear is not None:
+            return linear
         if wanted and attempt == 0:
             break
     if general is None:
         general = equations.solve(equations.closest()[2])  # the actuators moved too: short jacks fit no pose drawn at random
         if general is None or equations.mobility(general) != (len(robot.joints), 0):
             raise _cannot_close(robot, equations)
-        found = _linear(robot, equations, relations, general)
-        if found is not None:
-            return found
+        linear = _linear(robot, equations, relations, general)
+        if linear is not None:
+            return linear
     return _general(robot, equations, relations, general)
 
 
-def _general(
-    robot: Robot, equations: LoopEquations, relations: Mapping[int, tuple[Mapping[int, Expression], Expression]], q: Mapping[int, float]
-) -> Found:
+def _general(robot: Robot, equations: LoopEquations, relations: Relations, q: Mapping[int, float]) -> Closure:
     """The solution q as a general closure: declared relations, the sums of angles that planar loops fix, the rest tied."""
     row: dict[int, Mapping[int, Expression]] = {j: r for j, (r, _) in relations.items()}
     offset = {j: c for j, (_, c) in relations.items()}
     configuration = equations.configuration(q)
     for loop in robot.loops:
-        found = _angle_sum(robot, loop, configuration)
-        if found is not None and loop.cut in equations.unknown and set(found[0]) <= set(equations.free):
-            row[loop.cut], offset[loop.cut] = found
+        relation = _angle_sum(robot, loop, configuration)
+        if relation is not None and loop.cut in equations.unknown and set(relation[0]) <= set(equations.free):
+            row[loop.cut], offset[loop.cut] = relation
     tied = tuple(j for j in equations.unknown if j not in row)
-    return Found(row, offset, tied, configuration)
+    return _closure(robot, row, offset, tied, configuration)
 
 
 def _angle_sum(robot: Robot, loop: Loop, configuration: Mapping[int, float]) -> tuple[dict[int, Expression], Expression] | None:
@@ -267,9 +257,7 @@ def _wrong_mobility(robot: Robot, freedoms: int, left: int) -> DescriptionError:
     )
 
 
-def _linear(
-    robot: Robot, equations: LoopEquations, relations: Mapping[int, tuple[Mapping[int, Expression], Expression]], q: Mapping[int, float]
-) -> Found | None:
+def _linear(robot: Robot, equations: LoopEquations, relations: Relations, q: Mapping[int, float]) -> Closure | None:
     """The solution q as a linear closure, if it is one: whole constant rates, a recognised constant, proof over F_p."""
     G = equations.rates(q)
     N = np.round(G)
@@ -294,8 +282,8 @@ def _linear(
                 row[j][m] = row[j].get(m, ZERO) + g * n
             if i in equations.unknown:
                 offset[j] = offset[j] + g * offset[i]
-    found = Found(row, offset, (), equations.configuration(q))
-    return found if _coincide(robot, found) else None
+    linear = _closure(robot, row, offset, (), equations.configuration(q))
+    return linear if _coincide(linear) else None
 
 
 def _constant(robot: Robot, c: float) -> Expression | None:
@@ -324,18 +312,28 @@ def _length(robot: Robot, c: float) -> Expression | None:
     return None
 
 
-def _coincide(robot: Robot, found: Found) -> bool:
+def _closure(
+    robot: Robot,
+    row: Mapping[int, Mapping[int, Expression]],
+    offset: Mapping[int, Expression],
+    tied: tuple[int, ...],
+    start: Mapping[int, float],
+) -> Closure:
+    """The relations of the joints that have one, and every other joint in itself."""
+    free = (*robot.joints, *tied)
+    return Closure(robot, {j: {j: ONE} for j in free} | dict(row), dict.fromkeys(free, ZERO) | dict(offset), tied, start)
+
+
+def _coincide(closure: Closure) -> bool:
     """Whether cut and twin frames are equal over F_p for random lengths and positions: the proof of the relations."""
-    row = {j: {j: ONE} for j in robot.joints} | dict(found.row)
-    offset = dict.fromkeys(robot.joints, ZERO) | dict(found.offset)
-    draw = Draw(robot, 17, 3)
-    pose = frame_poses(Geometry(robot, draw, Closure(robot, row, offset)))
+    draw = Draw(closure.robot, 17, 3)
+    pose = frame_poses(Geometry(closure.robot, draw, closure))
 
     def equal(a: object, b: object) -> bool:
         x, y = (v.x if isinstance(v, Fp) else np.array([int(v) % draw.p]) for v in (a, b))  # type: ignore[call-overload]
         return bool(((x - y) % draw.p == 0).all())
 
-    for loop in robot.loops:
+    for loop in closure.robot.loops:
         (A, P), (B, Q) = pose[loop.cut], pose[loop.twin]
         entries = [*zip(P, Q, strict=True), *((A[k][m], B[k][m]) for k in range(3) for m in range(3))]
         if not all(equal(a, b) for a, b in entries):
@@ -350,11 +348,11 @@ def _cannot_close(robot: Robot, equations: LoopEquations) -> DescriptionError:
     also = ""
     if declared:
         try:
-            found = find_relations(replace(robot, constraints={j: e for j, e in robot.constraints.items() if j not in declared}))
+            closure = find_relations(replace(robot, constraints={j: e for j, e in robot.constraints.items() if j not in declared}))
         except DescriptionError:
             also = ", with or without the declared relations"
         else:
-            return _contradiction(robot, equations, declared, found)
+            return _contradiction(robot, equations, declared, closure)
     loop, gap, q = equations.closest()
     if gap < CLOSED:
         return _wrong_mobility(robot, *equations.mobility(q))
@@ -366,16 +364,16 @@ def _cannot_close(robot: Robot, equations: LoopEquations) -> DescriptionError:
     )
 
 
-def _contradiction(robot: Robot, equations: LoopEquations, declared: Mapping[int, Expression], found: Found) -> DescriptionError:
+def _contradiction(robot: Robot, equations: LoopEquations, declared: Mapping[int, Expression], closure: Closure) -> DescriptionError:
     """Both sides of every declared relation that is not the closure's, and how far the loop is open with the declared ones."""
     relations = declared_relations(robot)
     sides = []
     for j, e in declared.items():
-        if j not in found.row:
+        if j in closure.tied:
             sides.append(f"q{j}: declared {e}, the closure gives no linear relation (these lengths make no parallelogram)")
-        elif not _same(robot, relations[j], found, j):
-            sides.append(f"q{j}: declared {e}, the closure gives {_text(found, j)}")
-    q = {j: found.start[j] for j in equations.free}
+        elif not _same(robot, relations[j], closure, j):
+            sides.append(f"q{j}: declared {e}, the closure gives {_text(closure, j)}")
+    q = {j: closure.start[j] for j in equations.free}
     loop = max(robot.loops, key=lambda loop: equations.gap(q, loop))
     return DescriptionError(
         f"declared relations contradict the closure; {'; '.join(sides)}; with the declared ones frame {loop.cut} (cut) and frame {loop.twin} (twin) "
@@ -384,33 +382,29 @@ def _contradiction(robot: Robot, equations: LoopEquations, declared: Mapping[int
     )
 
 
-def _same(robot: Robot, relation: tuple[Mapping[int, Expression], Expression], found: Found, j: int) -> bool:
-    """Whether a declared relation is the found one, in the actuated joints, up to whole turns."""
+def _same(robot: Robot, relation: tuple[Mapping[int, Expression], Expression], closure: Closure, j: int) -> bool:
+    """Whether a declared relation is that of the closure, in the actuated joints, up to whole turns."""
     row: dict[int, Expression] = {}
     offset = relation[1]
     for i, g in relation[0].items():
-        for k, n in found.row.get(i, {i: ONE}).items():
+        for k, n in closure.row[i].items():
             row[k] = row.get(k, ZERO) + g * n
-        offset = offset + g * found.offset.get(i, ZERO)
-    turn = (offset - found.offset[j]).value(robot.constants) / (2 * np.pi) if robot.frame(j).sigma == REVOLUTE else 0.0
-    return {k: n for k, n in row.items() if n} == dict(found.row[j]) and abs(turn - round(turn)) < 1e-9
+        offset = offset + g * closure.offset[i]
+    turn = (offset - closure.offset[j]).value(robot.constants) / (2 * np.pi) if robot.frame(j).sigma == REVOLUTE else 0.0
+    return {k: n for k, n in row.items() if n} == dict(closure.row[j]) and abs(turn - round(turn)) < 1e-9
 
 
-def _text(found: Found, j: int) -> str:
+def _text(closure: Closure, j: int) -> str:
     """q_j as a relation, in the grammar of the robot file."""
-    total = found.offset[j]
-    for i, g in found.row[j].items():
+    total = closure.offset[j]
+    for i, g in closure.row[j].items():
         total = total + g * Expression.symbol(f"q{i}")
     return str(total)
 
 
 @lru_cache(maxsize=64)
 def close(robot: Robot) -> Closure:
-    """The closure of `robot`: declared relations checked, the others found. Raises DescriptionError where the loops cannot close."""
+    """The closure of `robot`: declared relations checked, linear ones derived. Raises DescriptionError where the loops cannot close."""
     if not robot.passive:
         return open_tree(robot)
-    found = find_relations(robot)
-    free = (*robot.joints, *found.tied)
-    return Closure(
-        robot, {j: {j: ONE} for j in free} | dict(found.row), dict.fromkeys(free, ZERO) | dict(found.offset), found.tied, found.start
-    )
+    return find_relations(robot)

@@ -26,47 +26,48 @@ class Algebra(Protocol):
 
     def constant(self, e: Expression) -> Scalar:
         """A constant expression: number, length, component of gravity, cos or sin of a fixed angle."""
-        ...
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
         """cos and sin of sum n_j q_j + offset."""
-        ...
 
     def q(self, j: int) -> Scalar:
         """Position of joint j."""
-        ...
 
     def qd(self, j: int) -> Scalar:
         """Velocity of joint j."""
-        ...
 
     def qdd(self, j: int) -> Scalar:
         """Acceleration of joint j."""
-        ...
 
     def rate(self, u: int, i: int) -> Scalar:
         """dq_u/dq_i of a passive joint u that only the loop equations tie to the actuated joint i."""
-        ...
 
     def sign(self, rate: Scalar, row: tuple[tuple[int, Expression], ...]) -> Scalar:
         """sign(sd), sd = G qd = `rate`, G = `row`."""
-        ...
 
     def one_sided(self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str) -> tuple[Scalar, Scalar]:
         """(sign(sd), sd) where the motion has the direction `when`, (0, 0) elsewhere."""
-        ...
 
     def name(self, value: Scalar, name: str) -> Scalar:
         """The same value, known as `name` from here on."""
-        ...
 
     def hint(self, value: Scalar, name: str) -> Scalar:
         """The same value, to be called `name` if it is used more than once."""
-        ...
 
     def section(self, title: str) -> None:
         """What follows belongs under this heading."""
-        ...
+
+
+class Unnamed:
+    """Part of an algebra that prints nothing: names and headings are left aside."""
+
+    def name(self, value: Scalar, name: str) -> Scalar:
+        return value
+
+    hint = name
+
+    def section(self, title: str) -> None:
+        return None
 
 
 def is_zero(v: Vector) -> bool:

@@ -104,15 +104,12 @@ class Source(Protocol):
 
     def random(self, count: int) -> dict[Variable, Array]:
         """`count` random geometries: residues, shape (count, 1)."""
-        ...
 
     def beta(self, geometry: dict[Variable, Array], count: int) -> dict[str, Array | None]:
         """{dependent: residues of its coefficients, shape (count, support), or None if it does not depend at every geometry}."""
-        ...
 
     def value(self, geometry: dict[Variable, Array], count: int, e: Expression) -> Array:
         """Residues of a constant expression at the geometries."""
-        ...
 
 
 class Residues:

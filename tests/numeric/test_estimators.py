@@ -14,7 +14,8 @@ from runtime.errors import SettingsError
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.methods import LINEAR, METHODS, estimate_of, linear_system
 from runtime.estimators.solution import null_groups, solve
-from runtime.observation.qr_factor import combine, factor
+from runtime.observation.qr_factor import Factor, factor
+from runtime.observation.segments import merged
 from runtime.observation.system import split_rows
 from runtime.settings.study import EstimateSettings
 
@@ -197,7 +198,7 @@ def test_parts_combine_to_the_whole():
     seen = observation(N=200, noise=(0.3, 0.05), seed=7)
     half = [np.r_[0:90, 200:290], np.r_[90:200, 290:400]]
     parts = [factor(seen.W[rows], seen.Y[rows], (len(rows) // 2,) * 2, seen.names) for rows in half]
-    both, whole = combine(parts), factor(seen.W, seen.Y, seen.rows, seen.names)
+    both, whole = Factor.of(seen.names, merged(part.joints for part in parts)), factor(seen.W, seen.Y, seen.rows, seen.names)
     X = solve(whole).X
     assert both.rows == whole.rows
     assert np.allclose(solve(both).X, X, rtol=1e-10)

@@ -15,10 +15,11 @@ from runtime import InputError, observe
 from runtime.errors import SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import Ellipsoid, Limits, feasibility, limit_rows, pulled, scales, standard_parameters
-from runtime.estimators.feasible import FeasibleOptions, linear, residual_norm, weighed
+from runtime.estimators.feasible import FeasibleOptions, residual_norm, weighed
 from runtime.estimators.methods import estimate_of
 from runtime.estimators.physical import negative_elements
 from runtime.estimators.semidefinite import closest, everything
+from runtime.estimators.wls import least_squares
 from runtime.identification.validation import split_validation
 from runtime.model.generated import load_model
 from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
@@ -112,7 +113,7 @@ def test_feasible_is_least_squares_where_that_is_feasible(name: str) -> None:
     assert found.details["least_squares"]["feasible"]
     np.testing.assert_array_equal(found.X, ols.X)
     physical, options = physical_model(model), FeasibleOptions(margin=1e-9)
-    chi, weight = weighed(linear(seen, FEASIBLE, options).weighted, physical, options)
+    chi, weight = weighed(least_squares(seen, FEASIBLE, {}).weighted, physical, options)
     assert weight == 0 and np.abs((physical.K @ chi - ols.X) / ols.sigma).max() < 1e-2
 
 
@@ -368,5 +369,5 @@ def test_tx40_record(tx40, tx40_data) -> None:
     for split in (study.validate.split, study.validate.split[::-1]):  # each half predicts the other better than by least squares
         errors = [split_validation(seen, split, how, model=tx40).predictions[1].relative_error for how in (EstimateSettings(), FEASIBLE)]
         assert errors[1] < 0.98 * errors[0]
-    system = linear(seen, FEASIBLE, FeasibleOptions())
+    system = least_squares(seen, FEASIBLE, {})
     assert residual_norm(system.weighted, found.X) == pytest.approx(found.residual_norm, rel=1e-9)

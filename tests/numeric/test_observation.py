@@ -19,7 +19,7 @@ from runtime.identification.validation import weak_directions
 from runtime.observation.filters import States, decimated, filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states, select_rows, stack
 from runtime.observation.qr_factor import factor
-from runtime.observation.regressor_signals import decimated_columns, distinct_entries, signals_of
+from runtime.observation.regressor_signals import DecimatedSignals, decimated_columns, distinct_entries
 from runtime.records.stream import RecordStream
 from runtime.settings.study import Decimate, EstimateSettings, study_from_mapping
 
@@ -69,7 +69,7 @@ def test_equal_signals_are_filtered_once():
     assert len(entries.k) == planar.STRUCTURE.sum() == 13
     assert len(entries.source) == 12  # ZZ2 acts alike on both joints
     states = States(*(x[:100] for x in motion(T)))
-    signals = signals_of(planar, states, entries, {})
+    signals = DecimatedSignals(planar, entries, {}, None)(states)
     D = planar.regressor(states.q, states.qd, states.qdd)
     for k, j, which, sign in zip(entries.k, entries.j, entries.which, entries.sign, strict=True):
         np.testing.assert_array_equal(sign * signals[which], D[:, j, k])
@@ -138,7 +138,9 @@ def test_blocks_equal_the_whole(record):
     entries = distinct_entries(planar, {})
     states = States(*motion(np.arange(10000) / RATE))  # longer than two blocks
     D = planar.regressor(states.q, states.qd, states.qdd).transpose(2, 1, 0)
-    np.testing.assert_array_equal(signals_of(planar, states, entries, {}), D[entries.k[entries.source], entries.j[entries.source]])
+    np.testing.assert_array_equal(
+        DecimatedSignals(planar, entries, {}, None)(states), D[entries.k[entries.source], entries.j[entries.source]]
+    )
 
 
 def test_rows_left_out_are_counted(record):

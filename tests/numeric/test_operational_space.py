@@ -214,3 +214,16 @@ def test_bad_input(arm):
         operational_space(arm, fit, Q, axes=PLANE, speed=0)
     with pytest.raises(InputError, match="FS9: not base parameters of planar_2r"):
         operational_space(arm, estimate(["FS9"], np.ones(1)), Q, axes=PLANE)
+
+
+def test_parameters_that_the_record_does_not_determine(arm):
+    """Their covariance is nan: deviations are nan where a quantity depends on them, and elsewhere those of the others."""
+    fit = random_estimate(arm)
+    known = operational_space(arm, fit, Q, axes=PLANE)
+    lost = fit.names.index("FS1")
+    C = fit.covariance.copy()
+    C[lost], C[:, lost] = np.nan, np.nan
+    space = operational_space(arm, estimate(fit.names, fit.X, C), Q, axes=PLANE)
+    assert np.isnan(space.friction.sigma).any() and np.isfinite(space.friction.value).all()
+    for quantity, whole in ((space.mass, known.mass), (space.static_force, known.static_force), (space.stiffness, known.stiffness)):
+        np.testing.assert_allclose(quantity.sigma, whole.sigma, rtol=1e-6)

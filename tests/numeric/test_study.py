@@ -4,6 +4,7 @@ import math
 import pickle
 from dataclasses import FrozenInstanceError, replace
 
+import numpy as np
 import pytest
 
 from runtime.errors import InputError, SettingsError
@@ -11,7 +12,7 @@ from runtime.records.datasets import DATASETS, dataset_study
 from runtime.records.named import study_of
 from runtime.settings.arithmetic import number
 from runtime.settings.files import load_study, study_from_text
-from runtime.settings.study import Lowpass, Rows, Signals, Study, study_from_mapping, to_mapping
+from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study, study_from_mapping, to_mapping
 
 DESIGN = """
 symgen: 1
@@ -213,12 +214,18 @@ def test_settings_made_in_python_are_checked():
         (lambda: Lowpass(cutoff=-1), "cutoff: -1; expected more than 0"),
         (lambda: Lowpass(50, 4, ("q", "qdd")), r"on[1]: 'qdd'; expected q or qd"),
         (lambda: Lowpass(frequency=50), "unknown key frequency; known: cutoff, order, on, padding"),
+        (lambda: Rows((0, 1), 3, 0.0, 5), "Unexpected positional argument"),
         (lambda: Signals(lowpass=3), "lowpass: 3; expected a mapping with some of cutoff"),
         (lambda: replace(Study(), stream=3), "stream: 3; expected auto or off or at least 10"),
     ):
         with pytest.raises(SettingsError) as e:
             make()
         assert said in str(e.value)
+
+
+def test_numbers_of_numpy_are_numbers():
+    study = Study(cestac=CestacSettings(delta=np.array([1e-3, 2e-3]), runs=np.int64(3)), rows=Rows(low_speed=np.float32(0.5)))
+    assert (study.cestac.delta, study.cestac.runs, study.rows.low_speed) == ((1e-3, 2e-3), 3, 0.5)
 
 
 def test_settings_are_values():

@@ -1,4 +1,4 @@
-"""The fused C kernels of studies (kernels.c), compiled on first use: filters, decimation and least squares around the signals of a robot in C.
+"""The C kernels of resolution studies (kernels.c), compiled on first use: filters, decimation and least squares around the signals of a robot in C.
 
     FilteredStates(q, rate, signals, room)                  as runtime.observation.filters.filtered_states
     SignalEntries(model, names)                                   which signals stand where in the wanted columns
@@ -99,21 +99,21 @@ def library(folder: Path | None = None) -> ctypes.CDLL:
 
 def _opened(path: Path) -> ctypes.CDLL:
     """The object, if it has this interface."""
-    found = ctypes.CDLL(str(path))
+    opened = ctypes.CDLL(str(path))
     layout = (ctypes.c_int64 * 8)()
     try:
-        found.fused_abi.restype = ctypes.c_int32
-        abi = found.fused_abi()
-        found.fused_layout.restype = None
-        found.fused_layout(layout)
+        opened.fused_abi.restype = ctypes.c_int32
+        abi = opened.fused_abi()
+        opened.fused_layout.restype = None
+        opened.fused_layout(layout)
         for name in ("states", "gather", "decimated", "normal", "residual", "rows"):
-            getattr(found, f"fused_{name}").restype = ctypes.c_int32
+            getattr(opened, f"fused_{name}").restype = ctypes.c_int32
     except AttributeError as e:
         raise NotCompiledError(f"{SOURCE.name} is not the one of this version: {e}") from e
     expected = [SIDE, SPAN, *map(ctypes.sizeof, STRUCTURES)]
     if abi != ABI or layout[0] not in (1, LANES) or list(layout[1:]) != expected:
         raise NotCompiledError(f"{SOURCE.name} has interface {abi} and sizes {list(layout)}, expected {ABI} and {[LANES, *expected]}")
-    return found
+    return opened
 
 
 class Room:
@@ -124,13 +124,13 @@ class Room:
 
     def array(self, name: str, *shape: int, dtype: Any = float) -> Array:
         """An array of this shape, not initialised, on a 64-byte boundary: the one given under this name before, where it fits."""
-        found = self._arrays.get(name)
-        if found is None or found.shape != shape:
+        array = self._arrays.get(name)
+        if array is None or array.shape != shape:
             size = int(np.prod(shape)) * np.dtype(dtype).itemsize
             raw = np.empty(size + 64, dtype=np.uint8)
             start = -raw.ctypes.data % 64
-            found = self._arrays[name] = raw[start : start + size].view(dtype).reshape(shape)
-        return found
+            array = self._arrays[name] = raw[start : start + size].view(dtype).reshape(shape)
+        return array
 
 
 def address(x: Array) -> int:
@@ -156,9 +156,17 @@ def _lowpass(low: Lowpass | None, name: str, rate: float) -> tuple[LowpassStruct
 
 
 class FilteredStates:
-    """q, qd, qdd of measured positions q, shape (N, n): median, low-pass, difference, low-pass, difference. As C keeps them, in `room`.
+    """q, qd, qdd of measured positions: median, low-pass, difference, low-pass, difference. As C keeps them, in `room`.
 
-    up, step : moves q before all filters but the median by +step where `up`, uint8 of shape (N, n), is 1, and by -step where it is 0.
+    Parameters
+    ----------
+    q : ndarray, shape (N, n), rad or m
+    rate : float, Hz
+    signals : SignalSettings
+    room : Room
+    up : ndarray of uint8, shape (N, n), optional
+        Moves q, after the median alone, by +step where it is 1 and by -step where it is 0.
+    step : float, rad or m
     """
 
     def __init__(self, q: Array, rate: float, signals: SignalSettings, room: Room, *, up: Array | None = None, step: float = 0.0) -> None:
@@ -177,16 +185,23 @@ class FilteredStates:
     def rows(self, samples: slice) -> Array:
         """q, qd, qdd of these samples, shape (3, n, samples)."""
         m = samples.stop - samples.start
-        found = np.empty((3, self.n, m))
-        pointers = [ctypes.c_void_p(address(x)) for x in found]
+        states = np.empty((3, self.n, m))
+        pointers = [ctypes.c_void_p(address(x)) for x in states]
         call("gather", ctypes.byref(self.structure), *map(ctypes.c_int64, (samples.start, m)), *pointers, ctypes.c_int64(m))
-        return found
+        return states
 
 
 class SignalEntries:
-    """Where the signals of a robot stand in the columns `names`: entry e of joint j is sign[e]*U[signal[e]], start[j] <= e < start[j + 1].
+    """Where the signals of a robot stand in the columns `names`: entry e of joint j is sign[e]*U[wanted[number[e]]], start[j] <= e < start[j + 1].
 
-    columns : by joint, positions in `names` of its entries.   wanted : signals that occur, `number` their position in it, by entry.
+    Attributes
+    ----------
+    columns : tuple of ndarray
+        By joint, positions in `names` of its entries; `place` the same by entry.
+    wanted : ndarray
+        Signals that occur.
+    number : ndarray
+        Position in `wanted` of the signal of each entry.
     """
 
     def __init__(self, model: CompiledModel, names: Sequence[str]) -> None:
@@ -201,9 +216,8 @@ class SignalEntries:
         self.start = np.concatenate([[0], np.cumsum(np.bincount(table.row[order], minlength=n))]).astype(np.int32)
         self.columns = tuple(place[order][self.start[j] : self.start[j + 1]] for j in range(n))
         self.place: Array = place[order]
-        self.signal: Array = table.signal[order].astype(np.int32)
         self.sign = np.ascontiguousarray(table.sign[order], dtype=float)
-        self.wanted, number = np.unique(self.signal, return_inverse=True)
+        self.wanted, number = np.unique(table.signal[order].astype(np.int32), return_inverse=True)
         self.number: Array = number.reshape(-1).astype(np.int32)
 
 

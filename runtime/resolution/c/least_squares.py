@@ -15,7 +15,7 @@ from scipy.linalg.lapack import dgeqrf
 
 from runtime.estimators.normal_equations import LIMIT, LeastSquares, Normal
 from runtime.estimators.solution import solve
-from runtime.observation.qr_factor import Factor, JointFactor, stacked
+from runtime.observation.qr_factor import Factor, JointFactor
 from runtime.resolution.c.kernels import LANES, SIDE, SPAN, EntriesStructure, Room, RowsStructure, SignalEntries, address, call
 
 Array = np.ndarray
@@ -106,7 +106,7 @@ class KeptRows:
             JointFactor(np.asarray(C), block[:, :count].T.copy(), int(rows))
             for C, block, count, rows in zip(self.entries.columns, blocks, self.counts, total, strict=True)
         )
-        return Factor(self.entries.names, stacked(joints, len(self.entries.names)), joints)
+        return Factor.of(self.entries.names, joints)
 
     def _pass(self, task: str, entries: EntriesStructure, *arguments: ctypes.c_void_p) -> None:
         """One pass of fused_normal or fused_residual over all rows."""

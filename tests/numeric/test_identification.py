@@ -1,0 +1,112 @@
+"""`runtime.identify` and `runtime.report` from Python: records and streams mixed, records of one name, everything asked for in one result."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import runtime
+from runtime.identification.assessment import assess
+from runtime.records.provenance import origin, record_names
+from runtime.records.stream import RecordStream
+from runtime.settings.location import located, study_text
+from runtime.settings.study import study_from_mapping
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+STUDY = study_from_mapping({"signals": {"lowpass": {"cutoff": 20}}, "cestac": {"runs": 2, "delta": "2*pi/5000"}})
+
+
+@pytest.fixture(scope="module")
+def model():
+    return runtime.load_model(GENERATED / "planar_2r.py")
+
+
+def measured(model, seed, name="run"):
+    """8 s of the planar arm at 200 Hz with torque noise; another motion for each seed."""
+    t = np.arange(1600)[:, None] / 200
+    rng = np.random.default_rng(seed)
+    w = 2 * np.pi * np.array([[0.3, 0.4], [0.7, 0.9], [1.6, 1.3]])[:, None]
+    amplitude = np.array([[0.8, 0.9], [0.4, 0.3], [0.1, 0.15]])[:, None]
+    phase = w * t + rng.uniform(0, 2 * np.pi, (3, 1, 2))
+    q, qd, qdd = (amplitude * np.sin(phase)).sum(0), (amplitude * w * np.cos(phase)).sum(0), -(amplitude * w**2 * np.sin(phase)).sum(0)
+    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(model.VALUES)) + 0.05 * rng.standard_normal(q.shape)
+    return runtime.Record(t[:, 0], q, tau, name=name)
+
+
+def test_one_record_without_a_study(model):
+    """The five lines of a notebook: every part of the result, as text and as HTML."""
+    result = runtime.identify(model, measured(model, 0))
+    assert result.estimate.names == model.BASE_PARAMETERS and result.model_estimate is result.essential.estimate
+    assert result.checklist.state in ("good", "doubtful", "no") and len(result.checklist.checks) >= 8
+    for shown in (result, result.checklist, result.estimate):
+        root = ElementTree.fromstring(shown._repr_html_())
+        assert root.find("table") is not None
+    assert result.verdict in str(result) and str(result.checklist).startswith(result.checklist.answer)
+
+
+def test_records_and_streams_are_fitted_together(model):
+    """The streams of a mixed list were dropped without a word."""
+    first, second = measured(model, 1, "a"), measured(model, 2, "b")
+    whole = runtime.identify(model, [first, second], STUDY)
+    mixed = runtime.identify(model, [first, RecordStream(second, 500)], STUDY)
+    assert mixed.estimate.rows == whole.estimate.rows and mixed.name == "a, b"
+    np.testing.assert_allclose(mixed.estimate.X, whole.estimate.X, rtol=1e-9, atol=1e-9)
+    assert [one.rows for one in mixed.record_errors] == [one.rows for one in whole.record_errors]
+
+
+def test_records_of_one_name_stay_apart(model):
+    """Keyed by name, the second of two further records overwrote the first, and time stamps were those of the last."""
+    first, second = measured(model, 3), measured(model, 4)
+    assert record_names([first, second, first]) == ("run", "run (2)", "run (3)")
+    result = runtime.identify(model, first, STUDY, further=[first, second])
+    parts = [p.part for p in result.validation[1].predictions if p.columns == "all"]
+    assert len(result.validation[1].predictions) == 6 and len(set(parts)) == 3
+    both = runtime.identify(model, [first, second], STUDY)
+    assert both.name == "run, run (2)" and both.estimate.provenance["records"] == ["run", "run (2)"]
+    assert [one.name for one in both.record_errors] == ["run", "run (2)"]
+    stamped = [SimpleNamespace(name="run", time="uniform"), SimpleNamespace(name="run", time="a gap")]
+    assert origin(stamped)["time"] == {"run": "uniform", "run (2)": "a gap"}
+
+
+def test_report_writes_what_the_verbs_write(model, tmp_path):
+    result = assess(model, measured(model, 5), STUDY, encoder=(1e-4,))
+    assert result.missing == () and result.feasibility is not None and len(result.friction) == 2
+    assert result.checklist.checks[-1].state != "open" and result.checklist.checks[-2].state != "open"
+    paths = runtime.report(result, str(tmp_path / "out"))
+    names = {path.name for path in paths}
+    assert {"report.html", "estimate.json", "friction.png", "advice.json", "cestac.json", "study.yaml", "parameters.tex"} <= names
+    assert names == {path.name for path in (tmp_path / "out").iterdir()}
+    written = json.loads((tmp_path / "out" / "estimate.json").read_text())
+    assert written["X"] == result.estimate.X.tolist() and written["feasibility"]["feasible"] and len(written["friction"]) == 2
+    study = runtime.report(result.resolution, tmp_path / "resolution", study=STUDY)
+    assert "resolution.png" in {path.name for path in study} and "report.html" in {path.name for path in study}
+    with pytest.raises(TypeError, match="float is no result that is written"):
+        runtime.report(1.0, tmp_path / "wrong")
+    assert not (tmp_path / "wrong").exists()
+
+
+def test_files_of_a_study_follow_it(tmp_path):
+    """Relative to the folder where it is written; the file of the controller's reference stayed behind."""
+    study = study_from_mapping({
+        "record": {"files": ["q.csv", "tau.csv"]}, "validate": {"record": {"files": ["b.csv"]}},
+        "payload": {"record": {"files": ["loaded.csv"]}}, "controller": {"reference": {"file": "motion.csv"}},
+    })  # fmt: skip
+    here = located(study, tmp_path / "in")
+    assert here.record[0].files == (str(tmp_path / "in" / "q.csv"), str(tmp_path / "in" / "tau.csv"))
+    text = study_text(here, tmp_path / "out")
+    for file in ("q.csv", "tau.csv", "b.csv", "loaded.csv", "motion.csv"):
+        assert f"../in/{file}" in text
+    assert str(tmp_path) not in text
+    dataset = study_from_mapping({"record": {"dataset": "emps", "files": ["DATA_EMPS.mat"]}})
+    assert located(dataset, tmp_path).record == dataset.record
+
+
+def test_undetermined_parameters_end_the_assessment(model):
+    record = measured(model, 6)
+    still = replace(record, q=np.column_stack([record.q[:, 0], np.zeros(len(record))]))
+    result = assess(model, still, STUDY)
+    assert not result.determined and result.checklist.state == "no" and "does not determine" in result.missing[0]
