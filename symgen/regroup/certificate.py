@@ -1,11 +1,16 @@
 """The certificate of regrouping formulas: two independent routes, one exact, one numeric.
 
-Exact, over F_p at fresh random lengths and states, for two primes:
+Exact, over F_p at fresh random lengths and states, for two or more primes:
 
     D_chi = sum_k coefficient_k,chi D_base,k   for every standard parameter chi,      rank_p(D_base) = number of base parameters.
 
-The rank over F_p is never above the generic rank, so equality proves that no further relation exists; a false identity survives
-one state with probability at most degree/p. General loops: the same identities at random points of the closed mechanism (`regroup.general`).
+The primes are drawn anew, so that no coefficient is checked over the prime that gave it. The rank over F_p is never above the generic rank, so
+equality proves that no further relation exists. A false identity is a nonzero rational function of the geometry and of each state; with
+its degree bounded by d (`degree`: every angle counts 2 per multiple, numerator and denominator together) it vanishes at a random geometry, or at
+every state of one, with probability at most 2 d/p (Schwartz 1980, Zippel 1979). Draws are repeated until (2 d/p)**draws is below SURE. Numbers are
+not random: a false identity among them is a fixed nonzero number, which only its own few prime factors divide.
+
+General loops: the same identities at random points of the closed mechanism (`regroup.general`).
 
 Numeric, in floats at the lengths of the robot file: the standard regressor W of a dynamics by energies (`derive.lagrange`), which shares
 no code with the recursions, has the rank of the base parameters (SVD), and W chi = W_base X for random chi and X of the formulas.
@@ -21,9 +26,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symgen.derive.exact import Array, Draw, Fp, primes_for
+from symgen.derive.exact import Array, Draw, Fp, primes_for, units_of
 from symgen.derive.loops import close
-from symgen.description.robot import Robot
+from symgen.description.expression import Call, Expression, Number, quarter_turns
+from symgen.description.robot import REVOLUTE, Frame, Robot
 from symgen.regroup.finite_field import rref
 from symgen.regroup.general import closed_draw
 from symgen.regroup.regrouping import NUMERIC, Regrouping
@@ -34,6 +40,7 @@ if TYPE_CHECKING:
 
 Sampler = Callable[[Draw, tuple[str, ...]], Array]
 ROUNDED = 1e-7  # of the largest entry: columns by coefficients that are numbers
+SURE, MOST_DRAWS = 1e-12, 8  # largest probability that a false identity passes, and draws over F_p at most
 TOLERANCE = 1e-9  # relative to the largest entry: rounding of some thousand operations and of the closed loops
 
 
@@ -64,6 +71,8 @@ class Certificate:
         module was evaluated.
     general : bool
         Whether the robot has general loops, whose rank is that of the independent regressor; singular values far above rounding prove it.
+    error_probability : float
+        Bound on the probability that a false identity passes the exact checks; 1 where coefficients are numbers, which are checked in floats.
     """
 
     name: str
@@ -78,6 +87,7 @@ class Certificate:
     torque_error: float
     module_errors: Mapping[str, float] = field(default_factory=dict)
     general: bool = False
+    error_probability: float = 0.0
 
     @property
     def numeric_valid(self) -> bool:
@@ -103,6 +113,7 @@ class Certificate:
             "primes": list(self.primes),
             "identities": self.identities,
             "failures": list(self.failures),
+            "error_probability": self.error_probability,
             "method": self.method,
             "numeric_rank": self.numeric_rank,
             "numeric_gap": _finite(self.numeric_gap),
@@ -114,11 +125,12 @@ class Certificate:
     def __str__(self) -> str:
         """A line per check, marked `ok` or FALSE, then the verdict."""
         where = f"modulo {' and '.join(map(str, self.primes))}" if self.primes and not self.general else "in floats"
+        doubt = f"; a false one passes with probability below {self.error_probability:.0e}" if self.primes else ", in floats"
         columns = any(text.startswith("column") for text in self.failures)
         lines = [
             f"{self.name}: {self.count} base parameters of {self.identities}, {self.method}",
             f"{_mark(self.rank == self.count)} rank of the base columns {where}: {self.rank}",
-            f"{_mark(not columns)} {self.identities} column identities at fresh lengths and states",
+            f"{_mark(not columns)} {self.identities} column identities at fresh lengths and states{doubt}",
             f"{_mark(self.numeric_rank == self.count)} rank of the CasADi regressor by SVD: {self.numeric_rank} (gap {self.numeric_gap:.1e})",
             f"{_mark(self.torque_error < TOLERANCE)} torques of the base parameters against CasADi: {self.torque_error:.1e} of the largest",
             *(
@@ -157,7 +169,11 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
     robot = regrouping.robot
     witness, rank, gap = independent(robot)
     base = [robot.parameters.index(own) for own in regrouping.own]
-    primes = primes_for(robot, 2)
+    bound = 2 * degree(regrouping) / 2**30
+    draws = 2
+    while bound**draws > SURE and draws < MOST_DRAWS:
+        draws += 1
+    primes = primes_for(robot, draws, seed)
     exact_ranks, wrong = zip(*(_modulo(regrouping, seed + k, p, sampler) for k, p in enumerate(primes)), strict=True)
     if close(robot).tied:
         exact_rank = numeric_rank(witness.W[:, base])[0]
@@ -186,7 +202,36 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
         numeric_gap=gap,
         torque_error=error,
         general=bool(close(robot).tied),
+        error_probability=bound**draws if primes else 1.0,
     )
+
+
+def degree(regrouping: Regrouping) -> int:
+    """A bound on the degree of the column identities in all random variables: half-angle tangents, lengths, rates, directions.
+
+    An entry of the regressor passes each frame of a path at most twice, outwards and back, with two rotations and a displacement each.
+    """
+    robot, closure, units = regrouping.robot, close(regrouping.robot), units_of(regrouping.robot)
+
+    def angle(e: Expression) -> int:
+        return 2 * sum(abs(k) for unit, k in units.of(quarter_turns(e)[1]))
+
+    def constant(e: Expression) -> int:
+        return max((sum(abs(n) * atom(a) for a, n in m) for m in e.terms), default=0)
+
+    def atom(a: str | Number | Call) -> int:
+        if not isinstance(a, Call):
+            return 1
+        return angle(a.argument) if a.function in ("cos", "sin") else constant(a.argument)
+
+    def frame(f: Frame) -> int:
+        turn = 2 * sum(abs(n) for _, n in closure.turn(f.j)[0]) + angle(closure.offset[f.j]) if f.sigma == REVOLUTE else 1
+        return turn + sum(map(angle, (f.gamma, f.alpha, f.theta0))) + max(map(constant, (f.b, f.d, f.r0)))
+
+    path = max((sum(frame(robot.frame(i)) for i in robot.path(f.j)) for f in robot.frames), default=0)
+    rows = [g for e in robot.elements for table in (e.along, e.form) for row in table.values() for g in row.values()]
+    coefficients = max((constant(c) for b in regrouping.base for c in b.combination.values()), default=0)
+    return 2 * path + 3 + 2 * max(map(constant, rows), default=0) + coefficients
 
 
 def _modulo(regrouping: Regrouping, seed: int, p: int, sampler: Sampler) -> tuple[int, list[str]]:
