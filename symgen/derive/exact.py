@@ -79,12 +79,12 @@ def power(x: Array, n: int, p: int) -> Array:
 
 def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
     """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and the leading sign positive."""
-    found: dict[Expression, None] = {}
+    angles: dict[Expression, None] = {}
     for e in _angles(robot):
         rest = quarter_turns(e)[1]
-        if rest and -rest not in found:
-            found[rest] = None
-    return tuple(found)
+        if rest and -rest not in angles:
+            angles[rest] = None
+    return tuple(angles)
 
 
 def angle_denominators(robot: Robot) -> dict[Monomial, int]:
@@ -122,8 +122,7 @@ def _calls(robot: Robot) -> Iterator[Call]:
 def radicands(robot: Robot) -> tuple[int, ...]:
     """The primes below LARGEST_RADICAND under square roots of rational numbers."""
     arguments = {a.argument.constant for a in _calls(robot) if a.function == "sqrt"}
-    found = {l for c in arguments if c is not None for l in prime_factors(c.numerator * c.denominator)[0]}
-    return tuple(sorted(found))
+    return tuple(sorted({l for c in arguments if c is not None for l in prime_factors(c.numerator * c.denominator)[0]}))
 
 
 def prime_factors(n: int) -> tuple[tuple[int, ...], int]:
@@ -143,12 +142,12 @@ def primes_for(denominator: int, count: int) -> tuple[int, ...]:
     """The largest `count` primes p < 2**31 with 4 and 2 `denominator` dividing p + 1."""
     step = lcm(4, 2 * denominator)
     p = (2**31) // step * step - 1
-    found: list[int] = []
-    while len(found) < count:
+    primes: list[int] = []
+    while len(primes) < count:
         if _is_prime(p):
-            found.append(p)
+            primes.append(p)
         p -= step
-    return tuple(found)
+    return tuple(primes)
 
 
 def _is_prime(n: int) -> bool:

@@ -191,23 +191,23 @@ class PreciseResidues:
 
     def beta(self, geometry: dict[Variable, Array], count: int) -> dict[str, Array | None]:
         names = tuple(dict.fromkeys(name for d, support in self.supports.items() for name in (*support, d)))
-        found: dict[str, Array | None] = {d: np.zeros((count, len(s)), dtype=np.int64) for d, s in self.supports.items()}
+        residues: dict[str, Array | None] = {d: np.zeros((count, len(s)), dtype=np.int64) for d, s in self.supports.items()}
         for g in range(count):
             constants = default_geometry(self.robot) | {str(v): self.fraction[v, int(geometry[v][g, 0])] for v in self.variables}
             samples = -(-(max(map(len, self.supports.values())) + 3) // len(self.robot.joints)) + 1
             W = States(self.robot, constants, 50 + g).sample(names, samples)
             for d, support in self.supports.items():
-                self._store(found, g, d, [[row[names.index(name)] for name in (*support, d)] for row in W])
-        return found
+                self._store(residues, g, d, [[row[names.index(name)] for name in (*support, d)] for row in W])
+        return residues
 
-    def _store(self, found: dict[str, Array | None], g: int, d: str, rows: Matrix) -> None:
-        into = found[d]
+    def _store(self, residues: dict[str, Array | None], g: int, d: str, rows: Matrix) -> None:
+        into = residues[d]
         if into is None:
             return
         pivots, R = echelon(rows)
         fractions = [rational(row[-1]) for row in R] if pivots == list(range(into.shape[1])) else [None]
         if any(f is None for f in fractions):
-            found[d] = None
+            residues[d] = None
         else:
             into[g] = [f.numerator * pow(f.denominator, -1, self.p) % self.p for f in fractions if f is not None]
 

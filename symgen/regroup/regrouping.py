@@ -100,7 +100,7 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     base = tuple(names[c] for c in pivots)
     dependent = [c for c in range(len(names)) if c not in pivots]
     supports = {names[c]: tuple(base[k] for k in range(len(base)) if R[k, c]) for c in dependent}
-    relations = {name: dict(zip(supports[name], found, strict=True)) for name, found in coefficients(robot, supports).items()}
+    relations = {name: dict(zip(supports[name], betas, strict=True)) for name, betas in coefficients(robot, supports).items()}
     return _assemble(robot, transfer, base, relations, draw)
 
 

@@ -48,7 +48,7 @@ def sample(draw: Draw, names: tuple[str, ...]) -> Array:
 
 
 def states_for(robot: Robot, n_columns: int) -> int:
-    """Enough random states for the rank of `n_columns` columns to be seen."""
+    """Number of random states at which the sampled rank of `n_columns` columns is their rank."""
     return -(-(n_columns + 10) // len(robot.joints)) + 4
 
 
@@ -130,9 +130,9 @@ class Recognition:
         result: dict[str, list[Expression]] = {}
         for name, support in self.supports.items():
             if name in matters:
-                found = [self._recognise(name, k, matters[name][k]) for k in range(len(support))]
-                if all(e is not None for e in found):
-                    result[name] = [e for e in found if e is not None]
+                betas = [self._recognise(name, k, matters[name][k]) for k in range(len(support))]
+                if all(e is not None for e in betas):
+                    result[name] = [e for e in betas if e is not None]
         return result
 
     def _what_matters(self) -> dict[str, list[list[Variable]]]:
@@ -174,9 +174,9 @@ class Recognition:
                 return None
             p_columns = [self._value(m)[:count] for m in P]
             q_columns = [-pool[:count, k] * self._value(m)[:count] % self.p for m in Q]
-            found = self._fraction(np.stack([*q_columns, *p_columns], axis=1), Q, P)
-            if found is not None:
-                return found
+            beta = self._fraction(np.stack([*q_columns, *p_columns], axis=1), Q, P)
+            if beta is not None:
+                return beta
         self.reasons[name] = f"no fraction of degree up to {DEGREES[-1]} in {', '.join(map(str, matters)) or 'rational numbers'}"
         return None
 
