@@ -1,6 +1,6 @@
 r"""LaTeX tables as the chapter prints them, for \usepackage{booktabs}: Table 2 of an Estimate, Tables 3 and 4 of a resolution study, Table 7 of its errors.
 
-Nothing in a name, unit or label is read as LaTeX: what is not of the form the text makers below know is escaped, character by character.
+No name, unit or label is read as LaTeX: texts that have none of the forms known below are escaped, character by character.
 """
 
 from __future__ import annotations
@@ -28,16 +28,14 @@ NAME = re.compile(r"([A-Za-z]+)(\d[0-9_]*R?)")
 
 
 def escaped(text: str) -> str:
-    """Any text as one line that LaTeX prints as it is; what is neither printable nor a letter, digit or sign becomes ?."""
+    """Any text as one line that LaTeX prints as it is; characters that cannot be printed become ?."""
     return "".join(SPECIAL.get(c, c if c.isprintable() else " " if c.isspace() else "?") for c in text)
 
 
 def name_cell(name: str) -> str:
     """ZZ1R as ZZ with the subscript 1R; any other text as it is."""
-    found = NAME.fullmatch(name)
-    if found is None:
-        return escaped(name)
-    return rf"$\mathrm{{{found[1]}}}_{{\mathrm{{{escaped(found[2])}}}}}$"
+    parts = NAME.fullmatch(name)
+    return escaped(name) if parts is None else rf"$\mathrm{{{parts[1]}}}_{{\mathrm{{{escaped(parts[2])}}}}}$"
 
 
 def unit_cell(unit: str) -> str:
@@ -60,10 +58,10 @@ def number_cell(value: float, form: str = ".4g") -> str:
 
 def level_cell(label: str) -> str:
     """2*pi/10000 and Phi 0.01 of a level of a resolution study."""
-    if found := re.fullmatch(r"2\*pi/(\d+)", label):
-        return rf"$\Delta = 2\pi/{found[1]}$"
-    if found := re.fullmatch(r"Phi ([0-9.e+-]+)", label):
-        return rf"$\Phi = {number_cell(float(found[1]))[1:]}"
+    if step := re.fullmatch(r"2\*pi/(\d+)", label):
+        return rf"$\Delta = 2\pi/{step[1]}$"
+    if torque := re.fullmatch(r"Phi ([0-9.e+-]+)", label):
+        return rf"$\Phi = {number_cell(float(torque[1]))[1:]}"
     try:
         return rf"$\Delta = {number_cell(float(label))[1:]}"
     except ValueError:
@@ -75,8 +73,14 @@ def parameter_table(names: Sequence[str], X: Array, relative_sigma: Array, units
 
     Parameters
     ----------
-    X, relative_sigma : ndarray, shape (b,); relative_sigma in %.
-    blocks : number of blocks side by side, each with the three columns; 60 parameters fit a page in two.
+    X : ndarray, shape (b,), SI
+        Values.
+    relative_sigma : ndarray, shape (b,), %
+        Relative deviations.
+    units : mapping of str
+        Units by name.
+    blocks : int
+        Number of blocks side by side, each with the three columns; 60 parameters fit a page in two.
     """
     lines = [
         (name_cell(name) + unit_cell(units.get(name, "")), number_cell(x), number_cell(s, ".3f"))
@@ -92,9 +96,14 @@ def parameter_table(names: Sequence[str], X: Array, relative_sigma: Array, units
 def level_table(
     names: Sequence[str], units: Mapping[str, str], labels: Sequence[str], columns: Array, last: Sequence[tuple[str, Array]]
 ) -> str:
-    r"""Tables 3 and 4: the mean value at each level, then lines in per cent below a rule, such as ("%e($\rho$)", (levels,)).
+    r"""Tables 3 and 4: the mean value at each level, then lines in per cent below a rule.
 
-    columns : ndarray, shape (levels, b).
+    Parameters
+    ----------
+    columns : ndarray, shape (levels, b), SI
+        Mean values.
+    last : sequence of pairs of str and ndarray, shape (levels,), %
+        Lines below the rule, such as "%e($\rho$)" and its values.
     """
     header = ("Mechanical parameters", *(f"Value with {level_cell(label)}" for label in labels))
     rows = [[name_cell(n) + unit_cell(units.get(n, "")), *map(number_cell, columns[:, i])] for i, n in enumerate(names)]

@@ -25,6 +25,22 @@ def printable(text: str) -> str:
     return text
 
 
+class CertificateError(SymgenError):
+    """A certificate that does not hold: the robot is one, the verdict on it is negative.
+
+    Parameters
+    ----------
+    message : str
+        Which check does not hold.
+    certificate : object
+        The Certificate.
+    """
+
+    def __init__(self, message: str, certificate: object) -> None:
+        self.certificate = certificate
+        super().__init__(message)
+
+
 class DescriptionError(SymgenError):
     """A robot file (or a Robot built in Python) that does not describe a mechanism.
 

@@ -23,7 +23,8 @@ from runtime.estimators.methods import CLOSED_LOOP
 from runtime.estimators.physical import CERTAIN
 from runtime.identification.validation import CORRELATION
 from runtime.resolution.advice import Advice, step_text
-from runtime.resolution.result import BIASED, NEGLIGIBLE, Level
+from runtime.resolution.result import BIASED, NEGLIGIBLE
+from runtime.resolution.runs import Level
 from runtime.table import Table, notebook
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from runtime.identification.validation import WeakDirections
 from runtime.json_documents import Vector, Whole, json_schema
 from runtime.model.drives import Coupling
 from runtime.resolution.result import SCHEMA as CESTAC
-from runtime.resolution.result import LevelResult, Run, Verdict
+from runtime.resolution.result import LevelResult, Verdict
+from runtime.resolution.runs import Run
 from runtime.settings.study import Study
 
 RESULT = "SI units, rad, joint side. Equation numbers are those of the chapter. A number that does not exist is null. Readers leave out keys they do not know; keys may be added under the same version."

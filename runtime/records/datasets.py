@@ -107,6 +107,19 @@ EMPS = Dataset(
 DATASETS: Mapping[str, Dataset] = {"tx40": TX40, "emps": EMPS}
 
 
+def listing() -> list[dict[str, Any]]:
+    """Every dataset as JSON values: name, title, source, licence and files, each with its address, hash and path, null where it is not here."""
+    rows: list[dict[str, Any]] = []
+    for name, dataset in DATASETS.items():
+        paths = {file: locate(name, file) for file in dataset.files}
+        files = [
+            {"name": file, "url": dataset.url + file, "sha256": digest, "path": None if paths[file] is None else str(paths[file])}
+            for file, digest in dataset.files.items()
+        ]
+        rows.append({"name": name, "title": dataset.title, "source": dataset.source, "licence": dataset.licence, "files": files})
+    return rows
+
+
 def dataset_study(name: str) -> dict[str, Any]:
     """Settings of a dataset, as a mapping for `study_from_mapping`; the caller may change it."""
     return copy.deepcopy(dict(_dataset(name).study))

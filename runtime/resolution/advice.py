@@ -11,7 +11,8 @@ from scipy.special import stdtrit
 
 from runtime.estimators.estimate import Estimate
 from runtime.json_documents import json_text
-from runtime.resolution.result import BIASED, CONFIDENCE, DECIDING, Level, deciding_names
+from runtime.resolution.result import BIASED, CONFIDENCE, DECIDING, deciding_names
+from runtime.resolution.runs import Level
 from runtime.table import Table
 
 Array = np.ndarray

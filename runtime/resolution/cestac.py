@@ -34,8 +34,9 @@ from runtime.records.record import Record
 from runtime.resolution.c.workspace import usable
 from runtime.resolution.checkpoint import Checkpoint
 from runtime.resolution.perturbed import Task, perturbed, prepared, study_columns
-from runtime.resolution.result import Cestac, Level, Runs, level_result
+from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.run import forget, run_block
+from runtime.resolution.runs import Level, Runs
 from runtime.settings.study import CestacSettings, Study, to_mapping
 
 Progress = Callable[[int, int], None]

@@ -23,7 +23,7 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.files import read_bytes
 from runtime.records.formats.npz import archive_of
-from runtime.resolution.result import Runs
+from runtime.resolution.runs import Runs
 
 EVERY = 30.0  # s between two archives
 MOST = 20_000  # runs of one archive

@@ -22,8 +22,8 @@ from runtime.observation.filters import filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, stack
 from runtime.observation.rows import Selection, select_rows
 from runtime.records.record import Record
-from runtime.resolution.result import Level
 from runtime.resolution.rounding import rounded, stream
+from runtime.resolution.runs import Level
 from runtime.settings.study import CestacSettings, EstimateSettings, Study
 
 Array = np.ndarray

@@ -25,8 +25,8 @@ from runtime.observation.filters import States, decimation_plan, filtered_states
 from runtime.observation.regressor_signals import DecimatedSignals, distinct_entries
 from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.perturbed import PreparedRecord, Task, perturbed, perturbed_position, stream_keys, torque_rows
-from runtime.resolution.result import TRIANGULAR, Level, Run, Runs
 from runtime.resolution.rounding import ADDED, noise, stream
+from runtime.resolution.runs import TRIANGULAR, Level, Run, Runs
 
 Array = np.ndarray
 

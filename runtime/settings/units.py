@@ -4,8 +4,8 @@
     torque_unit("mA")        ("current", 0.001): the torque constant of the drive does the rest
     speed("30 rpm")          3.141592653589793
 
-The units of most records are in a table; pint is loaded for others, and knows them by their dimension. A unit is checked by a grammar of our own before pint
-sees it: names, products, quotients and small powers, no numbers and no calls. Factors are computed as fractions and rounded once.
+The units of most records are in a table; pint is loaded for others, which it knows by their dimension. A grammar checks a unit before pint reads
+it: names, products, quotients and small powers, no numbers and no calls. Factors are computed as fractions and rounded once.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ POSITIONS, TORQUES, TIMES, SPEEDS = (
     ("time",),
     ("angular speed", "speed"),
 )
-COMMANDS = ("current", "voltage")  # what a torque constant turns into torque or force
+COMMANDS = ("current", "voltage")  # a torque constant turns these into torque or force
 EXAMPLES = {
     POSITIONS: "rad, deg, rev, mrad, arcmin, counts, m, mm, inch",
     TORQUES: "N*m, mN*m, lbf*ft, ozf*inch, N, kgf, A, mA, V",
@@ -75,27 +75,27 @@ QUANTITY = re.compile(r"\s*([-+]?[0-9.]{1,30}(?:[eE][-+]?[0-9]{1,3})?)\s*([^\W\d
 
 
 def position_unit(text: str) -> Unit:
-    """ "angle", "length" or "counts", and the factor to rad or m; counts are still to be divided by those per revolution."""
+    """Kind of a unit of positions, "angle", "length" or "counts", and its factor to rad or m; counts are still to be divided by those per revolution."""
     return _unit(text, POSITIONS)
 
 
 def torque_unit(text: str) -> Unit:
-    """ "torque", "force", "current" or "voltage", and the factor to N m, N, A or V."""
+    """Kind of a unit of torques, "torque", "force", "current" or "voltage", and its factor to N m, N, A or V."""
     return _unit(text, TORQUES)
 
 
 def time_unit(text: str) -> float:
-    """Factor to s."""
+    """Factor of a unit of time to s."""
     return _unit(text, TIMES)[1]
 
 
 def speed(value: Any) -> Any:
-    """A speed such as "30 rpm" in rad/s or m/s, of a list each; what has no unit is left as it is."""
+    """A speed such as "30 rpm", or a list of speeds, in rad/s or m/s; a value without unit is returned as it is."""
     if isinstance(value, list | tuple):
         return [speed(x) for x in value]
-    if isinstance(value, str) and (found := QUANTITY.fullmatch(value)):
+    if isinstance(value, str) and (quantity := QUANTITY.fullmatch(value)):
         try:
-            return float(found[1]) * _unit(found[2].strip(), SPEEDS)[1]
+            return float(quantity[1]) * _unit(quantity[2].strip(), SPEEDS)[1]
         except ValueError as e:
             raise e if isinstance(e, InputError) else InputError(f"{value!r}; expected a number and a unit such as 30 rpm") from None
     return value
@@ -115,7 +115,7 @@ def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
 
 @cache
 def _of_pint(text: str) -> Unit:
-    """Kind and factor of a unit that is not in the table; ("", nan) where pint does not know it or it is of no kind that is measured here."""
+    """Kind and factor of a unit that is not in the table; ("", nan) where pint does not know the unit, or its kind is none of SI."""
     nothing = ("", float("nan"))
     if len(text) > LONGEST or not GRAMMAR.fullmatch(text):
         return nothing

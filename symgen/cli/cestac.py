@@ -55,7 +55,7 @@ def cestac(
         from runtime.resolution.checkpoint import Checkpoint
 
         model = session.model_of(robot, "numpy" if advise else target)
-        study = session.with_cestac(session.study_of_arguments(record), **given, columns=session.names_of(columns))
+        study = session.changed(session.study_of_arguments(record), "cestac", **given, columns=session.names_of(columns))
         records = read_records(study.record, model)
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -12,7 +12,9 @@ from symgen.cli.session import reported_errors
 def datasets(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> None:
     """List datasets: name, robot, files, where they are, and where they come from. Nothing is downloaded."""
     with reported_errors():
-        rows = found()
+        from runtime.records.datasets import listing
+
+        rows = listing()
         if json:
             import json as json_module
 
@@ -23,17 +25,3 @@ def datasets(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")
             for file in row["files"]:
                 typer.echo(f"  {file['name']:<24} {file['path'] or 'not here; symgen fetches it on first use'}")
                 typer.echo(f"  {'':<24} {file['url']}\n  {'':<24} sha256 {file['sha256']}")
-
-
-def found() -> list[dict[str, Any]]:
-    """What there is, as data."""
-    from runtime.records.datasets import DATASETS, locate
-
-    rows: list[dict[str, Any]] = []
-    for name, dataset in DATASETS.items():
-        files = []
-        for file, sha256 in dataset.files.items():
-            path = locate(name, file)
-            files.append({"name": file, "url": dataset.url + file, "sha256": sha256, "path": None if path is None else str(path)})
-        rows.append({"name": name, "title": dataset.title, "source": dataset.source, "licence": dataset.licence, "files": files})
-    return rows

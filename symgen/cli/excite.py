@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -43,15 +42,12 @@ def excite(
         import runtime
         from runtime.json_documents import json_text
         from runtime.records.reading import read_records
-        from runtime.settings.excitation import ExcitationSettings
-        from runtime.settings.schema import structure
-        from runtime.settings.study import Study, to_mapping
+        from runtime.settings.study import Study
 
         model = session.model_of(robot)
         study = Study() if record is None else session.study_of_arguments([record], recorded=False)
-        asked = {} if study.excitation is None else to_mapping(study.excitation)
-        settings = structure(ExcitationSettings, {**asked, **{key: value for key, value in given.items() if value is not None}})
-        study, records = replace(study, excitation=settings), read_records(study.record, model)
+        study = session.changed(study, "excitation", **given)
+        records = read_records(study.record, model)
         with session.progress_bar("starts") as progress:
             symbolic = session.symbolic_path(robot, model)
             result = runtime.excite(model, records, study, symbolic=symbolic, workers=workers, progress=progress)

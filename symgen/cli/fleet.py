@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from runtime.result_files import reserved, write_all
-from symgen.cli.session import NEGATIVE, model_of, reported_errors, single_thread
+from symgen.cli.session import NEGATIVE, model_of_job, reported_errors, single_thread
 
 if TYPE_CHECKING:
     from runtime.identification.fleet import Finished
-    from runtime.model.generated import GeneratedModel
 
 
 def fleet(
@@ -43,21 +42,10 @@ def fleet(
 
         files = None if output is None else identification_files
         result = identify_fleet(
-            file, load=_model, folder=output or "", files=files, workers=workers, scheduler=scheduler, finished=finished
+            file, load=model_of_job, folder=output or "", files=files, workers=workers, scheduler=scheduler, finished=finished
         )
         if results is not None:
             runtime.report(result, results)
         typer.echo(result.to_json() if json else result.to_text(), nl=not json)
     if not result.complete:
         raise typer.Exit(NEGATIVE)
-
-
-def _model(robot: str) -> GeneratedModel:
-    """The model of a job; what is wrong with its robot file is an error of that job alone."""
-    from runtime.errors import InputError
-    from symgen.errors import SymgenError
-
-    try:
-        return model_of(robot)
-    except SymgenError as e:
-        raise InputError(str(e)) from e

@@ -21,11 +21,11 @@ VERBS = {
     "fleet": "Identify many robots from their records, with one table.",
     "excite": "Search a motion that excites the parameters within the limits.",
     "simulate": "Simulate the closed loop of a study file and write its record.",
-    "datasets": "List the measured records this program knows, and where they lie.",
+    "datasets": "List the measured records this program knows.",
     "convert": "Write a robot in another format: .yaml, .par, .urdf.",
     "snippet": "Write a script that uses a robot in pinocchio or Drake.",
     "new": "Write a skeleton robot file.",
-    "schema": "Print the JSON Schema of robot files, for editors, or of results.",
+    "schema": "Print the JSON Schema of robot files or of results.",
     "demo": "The main job end to end, with a report.",
 }
 
@@ -43,7 +43,7 @@ class Verbs(TyperGroup):
             return None
         if self.listing:
             return TyperCommand(cmd_name, help=VERBS[cmd_name])
-        verb = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        verb = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
         verb.command(cmd_name)(getattr(import_module(f"symgen.cli.{cmd_name}"), cmd_name))
         return get_command(verb)
 
@@ -52,7 +52,9 @@ class Verbs(TyperGroup):
         super().format_help(ctx, formatter)
 
 
-app = typer.Typer(cls=Verbs, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(
+    cls=Verbs, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+)  # rich: 0.15 s
 
 
 def _version(wanted: bool) -> None:

@@ -38,8 +38,8 @@ def report(
         from runtime.records.reading_by_blocks import records_or_streams
 
         model = session.model_of(robot)
-        study = session.with_cestac(session.study_of_arguments(record), side=side)
-        steps = () if encoder is None else session.with_cestac(study, delta=encoder).cestac.delta
+        study = session.changed(session.study_of_arguments(record), "cestac", side=side)
+        steps = () if encoder is None else session.changed(study, "cestac", delta=encoder).cestac.delta
         records = records_or_streams(study.record, model, study.stream)
         simulator = session.simulator_of(robot, model, study)
         result = assess(model, records, study, encoder=steps, simulator=simulator, progress=session.say)

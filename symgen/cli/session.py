@@ -32,9 +32,9 @@ def single_thread() -> None:
 
 @contextmanager
 def reported_errors() -> Iterator[None]:
-    """Bad input as one message on the error stream and exit code 2, never a traceback."""
+    """Bad input as one message on the error stream and exit code 2, a false certificate with exit code 1, never a traceback."""
     from runtime.errors import DataUnavailableError, InputError
-    from symgen.errors import SymgenError
+    from symgen.errors import CertificateError, SymgenError
 
     try:
         yield
@@ -42,6 +42,8 @@ def reported_errors() -> Iterator[None]:
         raise
     except BrokenPipeError:
         _stop_printing()
+    except CertificateError as e:
+        fail(str(e), code=NEGATIVE)
     except (InputError, SymgenError) as e:
         fail(str(e), lines=isinstance(e, DataUnavailableError))
     except OSError as e:
@@ -56,13 +58,13 @@ def _stop_printing() -> NoReturn:
     raise typer.Exit(BROKEN_PIPE)
 
 
-def fail(message: str, *, lines: bool = False) -> NoReturn:
-    """End with `message` and exit code 2; on one line unless it is meant to have several: names in it may have any characters."""
+def fail(message: str, *, lines: bool = False, code: int = BAD_INPUT) -> NoReturn:
+    """End with `message` and an exit code; on one line unless it is meant to have several: names in it may have any characters."""
     from symgen.errors import printable
 
     text = message if lines else message.replace("\n", "\\n")
     typer.echo(f"error: {printable(text)}", err=True)
-    raise typer.Exit(BAD_INPUT)
+    raise typer.Exit(code)
 
 
 def say(text: str) -> None:
@@ -93,6 +95,17 @@ def model_of(robot: str, target: str = "numpy") -> GeneratedModel:
 
     model = load_model(symgen.model(robot))
     return model if target == "numpy" else _in_c(model, robot)
+
+
+def model_of_job(robot: str) -> GeneratedModel:
+    """The model of a job of a fleet: what is wrong with its robot file is an error of that job alone."""
+    from runtime.errors import InputError
+    from symgen.errors import SymgenError
+
+    try:
+        return model_of(robot)
+    except SymgenError as e:
+        raise InputError(str(e)) from e
 
 
 def _in_c(model: GeneratedModel, robot: str | None) -> GeneratedModel:
@@ -172,12 +185,13 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     return replace(study, record=(*study.record, *further))
 
 
-def with_cestac(study: Study, **given: Any) -> Study:
-    """The study with some of its cestac settings replaced, checked like those of a file; None: as in the study."""
+def changed(study: Study, section: str, **given: Any) -> Study:
+    """The study with some settings of a section replaced, checked like those of a file; None: as in the study."""
     from runtime.settings.study import study_from_mapping, to_mapping
 
     mapping = to_mapping(study)
-    return study_from_mapping({**mapping, "cestac": {**mapping["cestac"], **{k: v for k, v in given.items() if v is not None}}})
+    own = {**(mapping[section] or {}), **{key: value for key, value in given.items() if value is not None}}
+    return study_from_mapping({**mapping, section: own})
 
 
 def names_of(text: str | None) -> str | list[str] | None:

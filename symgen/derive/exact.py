@@ -90,12 +90,12 @@ def power(x: Array, n: int, p: int) -> Array:
 
 def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
     """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and the leading sign positive."""
-    found: dict[Expression, None] = {}
+    angles: dict[Expression, None] = {}
     for e in _angles(robot):
         rest = quarter_turns(e)[1]
-        if rest and -rest not in found:
-            found[rest] = None
-    return tuple(found)
+        if rest and -rest not in angles:
+            angles[rest] = None
+    return tuple(angles)
 
 
 class Units:

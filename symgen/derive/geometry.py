@@ -92,7 +92,7 @@ class Geometry:
         q = {i: self.algebra.q(i) for i in self.closure.row[j]}
         return add(self.closure.linear(self.algebra, j, q), self.algebra.constant(self.closure.offset[j]))
 
-    def carried(self, j: int, v: Vector) -> Vector:
+    def from_carrier(self, j: int, v: Vector) -> Vector:
         """Components in frame j of a vector given in the carrier's frame."""
         return v if is_zero(v) else self.carrier[j].rotation.down(v)
 

@@ -176,14 +176,11 @@ def _positive(x: Scalar) -> Scalar:
 
 def reachable(outputs: Iterable[Scalar | int]) -> list[Node]:
     """Nodes that the outputs need, in order of creation (operands first)."""
-    seen: set[int] = set()
-    found: list[Node] = []
+    nodes: dict[int, Node] = {}
     stack = [o.node for o in outputs if isinstance(o, Scalar)]
     while stack:
         node = stack.pop()
-        if node.index in seen:
-            continue
-        seen.add(node.index)
-        found.append(node)
-        stack.extend(x.node for x in node.operands)
-    return sorted(found, key=lambda n: n.index)
+        if node.index not in nodes:
+            nodes[node.index] = node
+            stack.extend(x.node for x in node.operands)
+    return [nodes[k] for k in sorted(nodes)]

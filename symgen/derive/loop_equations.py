@@ -1,7 +1,7 @@
 """The closure equations of general loops: as many as there are tied joints, with Jacobian and curvature, over any algebra.
 
 Loop: 0T_cut = 0T_twin. Residuals are the three components of P_cut - P_twin in frame 0 and of the axial vector of A_cut' A_twin (zero where the
-orientations agree); `chosen` are the rows that determine the tied joints best at the start configuration. Then
+orientations agree); `equations` are the rows of these that determine the tied joints best at the start configuration. Then
 
     r(q) = 0 ,    J qd = 0 ,    J qdd + Jd qd = 0 .
 """
@@ -42,15 +42,15 @@ def residuals(robot: Robot, algebra: Algebra, closure: Closure) -> list[Scalar]:
 
 @dataclass(frozen=True)
 class LoopSystem:
-    """The chosen equations of a robot with tied joints."""
+    """The equations of a robot with tied joints."""
 
     robot: Robot
     closure: Closure
-    chosen: tuple[int, ...]
+    equations: tuple[int, ...]
 
     def residual(self, algebra: Algebra) -> list[Scalar]:
         rows = residuals(self.robot, algebra, self.closure)
-        return [rows[k] for k in self.chosen]
+        return [rows[k] for k in self.equations]
 
     def alignment(self, algebra: Algebra) -> list[Scalar]:
         """Trace of A_cut' A_twin: 3 where a loop closes, -1 half a turn from there, where the axial vector is zero too.
@@ -66,13 +66,13 @@ class LoopSystem:
         columns = []
         for i in self.closure.independent:
             rows = residuals(self.robot, JetAlgebra(algebra, {i: 1}), self.closure)
-            columns.append([jet(rows[k]).xd for k in self.chosen])
+            columns.append([jet(rows[k]).xd for k in self.equations])
         return [list(row) for row in zip(*columns, strict=True)]
 
     def curvature(self, algebra: Algebra) -> list[Scalar]:
         """Jd qd."""
         rows = residuals(self.robot, JetAlgebra(algebra, {i: algebra.qd(i) for i in self.closure.independent}), self.closure)
-        return [jet(rows[k]).xdd for k in self.chosen]
+        return [jet(rows[k]).xdd for k in self.equations]
 
     def linearised(self, q: Mapping[int, float]) -> tuple[Array, Array]:
         """Residuals (m,) and their derivatives by the tied joints (m, m), in floats."""
@@ -107,19 +107,11 @@ class LoopSystem:
 def loop_system(robot: Robot) -> LoopSystem:
     """Choose the equations: pivoted elimination of their Jacobian in the tied joints at the start configuration."""
     closure = close(robot)
-    h = 1e-6
-    everything = LoopSystem(robot, closure, tuple(range(6 * len(robot.loops))))
-    J = np.zeros((6 * len(robot.loops), len(closure.tied)))
-    for column, u in enumerate(closure.tied):
-        sides = []
-        for step in (h, -h):
-            q = {j: np.asarray(closure.start[j] + (step if j == u else 0.0)) for j in closure.independent}
-            sides.append(np.array([float(x) for x in everything.residual(FloatAlgebra(robot, q))]))
-        J[:, column] = (sides[0] - sides[1]) / (2 * h)
-    chosen: list[int] = []
+    J = LoopSystem(robot, closure, tuple(range(6 * len(robot.loops)))).linearised(closure.start)[1]
+    equations: list[int] = []
     for _ in closure.tied:
         row = int(np.argmax(np.linalg.norm(J, axis=1)))
-        chosen.append(row)
+        equations.append(row)
         direction = J[row] / np.linalg.norm(J[row])
         J = J - np.outer(J @ direction, direction)
-    return LoopSystem(robot, closure, tuple(sorted(chosen)))
+    return LoopSystem(robot, closure, tuple(sorted(equations)))

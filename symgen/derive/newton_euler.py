@@ -100,7 +100,7 @@ class Motion:
         for k, multiple in carrier.turn:
             n = self.algebra.constant(Expression.number(multiple))
             rate, acceleration = add(rate, mul(n, self._qd[k])), add(acceleration, mul(n, self._qdd[k]))
-        w0, wd0 = geometry.carried(j, inner.w), geometry.carried(j, inner.wd)
+        w0, wd0 = geometry.from_carrier(j, inner.w), geometry.from_carrier(j, inner.wd)
         w = self.vector("W", (w0[0], w0[1], add(w0[2], rate)), j)
         wd = self.vector("WP", (add(wd0[0], mul(w[1], rate)), sub(wd0[1], mul(w[0], rate)), add(wd0[2], acceleration)), j)
         DV, DW, U = self._products(w, wd, j)

@@ -63,12 +63,12 @@ class Axes:
                 continue
             inside = geometry.is_inside(i, j)
             if sigma == REVOLUTE:
-                z = geometry.carried(j, self.z[i, m]) if inside else E3
+                z = geometry.from_carrier(j, self.z[i, m]) if inside else E3
                 lever = vadd(self.v[i, frame.ant], cross(self.z[i, frame.ant], geometry.P[j]))
                 v = geometry.rotation[j].down(motion.hinted("VS", lever, j, i))
             else:
                 z = ZERO3
-                v = geometry.carried(j, self.v[i, m]) if inside else E3
+                v = geometry.from_carrier(j, self.v[i, m]) if inside else E3
             self.z[i, j] = motion.vector("Z", z, j, i)
             self.v[i, j] = motion.vector("V", v, j, i)
         if frame.sigma != FIXED:

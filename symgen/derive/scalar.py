@@ -2,7 +2,7 @@
 
 A scalar is anything with + - * and unary minus: a float array, an array over F_p, a graph node, a CasADi SX. The Python integers 0,
 1 and -1 are structural in every algebra: they are known while the recursion runs, cost nothing and never reach the scalar.
-An `Algebra` turns the symbols of a robot (constants, angles, joint rates, signs) into scalars and is told the name of each step.
+An `Algebra` turns the symbols of a robot (constants, angles, joint rates, signs) into scalars and receives the name of each step.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Algebra(Protocol):
         """(sign(sd), sd) where the motion has the direction `when`, (0, 0) elsewhere."""
 
     def name(self, value: Scalar, name: str) -> Scalar:
-        """The same value, known as `name` from here on."""
+        """The same value, which later steps call `name`."""
 
     def hint(self, value: Scalar, name: str) -> Scalar:
         """The same value, to be called `name` if it is used more than once."""

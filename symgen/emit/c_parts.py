@@ -73,12 +73,12 @@ def _part(
 
 def definitions(before: Sequence[str], words: Iterable[str]) -> tuple[str, ...]:
     """The lines that define `words`, and what those need in turn."""
-    wanted, found = set(words), []
+    wanted, lines = set(words), []
     for line in reversed(before):
         if _defined(line) in wanted:
-            found.append(line)
+            lines.append(line)
             wanted.update(words_of([line]))
-    return tuple(reversed(found))
+    return tuple(reversed(lines))
 
 
 def words_of(lines: Iterable[str]) -> dict[str, None]:
@@ -87,5 +87,5 @@ def words_of(lines: Iterable[str]) -> dict[str, None]:
 
 
 def _defined(line: str) -> str:
-    found = DEFINED.match(line)
-    return found[1] if found else ""
+    match = DEFINED.match(line)
+    return match[1] if match else ""

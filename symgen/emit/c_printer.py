@@ -74,17 +74,17 @@ class CText(Text):
             if node.index in self.named & main and not node.fixed and node.op not in (COS, SIN):
                 mark = bisect_right(starts, node.index) - 1
                 lines.setdefault((-1, "Angles") if node.index in under else (mark, marks[mark][1]), []).append(self._line(node))
-        return tuple(Section(title, tuple(found)) for (_, title), found in lines.items())
+        return tuple(Section(title, tuple(under_title)) for (_, title), under_title in lines.items())
 
 
 def _needed(outputs: Iterable[Node]) -> Iterator[int]:
     """Indices of the nodes that a loop over the samples needs: not below a sine or cosine, nor below what is computed before the loop."""
-    stack, seen = list(outputs), set()
+    stack, visited = list(outputs), set()
     while stack:
         node = stack.pop()
-        if node.index in seen:
+        if node.index in visited:
             continue
-        seen.add(node.index)
+        visited.add(node.index)
         yield node.index
         if node.op not in (COS, SIN, CONST) and not node.fixed:
             stack.extend(x.node for x in node.operands)

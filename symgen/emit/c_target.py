@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 from symgen.derive.graph import Scalar
 from symgen.derive.loops import close
-from symgen.description.robot import Robot
 from symgen.emit.c_parts import Part, definitions, parts, words_of
 from symgen.emit.c_printer import CText, identifier
 from symgen.emit.header import header, packed, plain, wrapped
@@ -49,21 +48,12 @@ class Kernel:
     computed: int
 
 
-@dataclass(frozen=True)
-class CSpec:
-    """All that the template of the C file lays out."""
-
-    robot: Robot
-    header: tuple[str, ...]
-    kernels: tuple[Kernel, ...]
-    tile: int
-    joints: int
-
-
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     """The C file of `spec`. Same robot file, same version: same bytes."""
-    robot, c = spec.robot, c_spec(spec)
-    lines = [line for kernel in c.kernels for section in (*kernel.sections, Section("", kernel.before)) for line in section.lines]
+    robot = spec.robot
+    kernels = [_kernel(spec.regrouping, f.model) for f in spec.functions.values() if {*f.model.axes} <= {*RESULTS}]
+    most = max(kernel.computed + kernel.crossing for kernel in kernels)
+    lines = [line for kernel in kernels for section in (*kernel.sections, Section("", kernel.before)) for line in section.lines]
     return laid_out(
         "kernels.c",
         {
@@ -72,13 +62,13 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "sha256": robot.sha256,
             "version": VERSION,
             "command": _comment(command or robot.file or robot.name),
-            "header": [_comment(line) for line in c.header],
+            "header": [_comment(line) for line in _header(spec)],
             "name": robot.name,
             "abi": ABI,
-            "n": c.joints,
-            "tile": c.tile,
-            "kernels": layout(c),
-            "signals": signals_layout(c),
+            "n": len(robot.joints),
+            "tile": 16 if 8 * 16 * most <= SCRATCH else 8,  # the rows of a short tile stay in the first cache
+            "kernels": [_layout(spec, kernel) for kernel in kernels],
+            "signals": _signals_layout(spec, kernels[0]),
             "helpers": {name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")},
         },
     )
@@ -88,14 +78,6 @@ def _comment(text: str) -> str:
     """Text that cannot end a C comment, start another or continue a line."""
     shown = "".join(c if c.isprintable() else " " for c in plain(text))
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", shown)
-
-
-def c_spec(spec: ModuleSpec) -> CSpec:
-    """The kernels of the models of `spec`."""
-    kernels = [_kernel(spec.regrouping, f.model) for f in spec.functions.values() if {*f.model.axes} <= {*RESULTS}]
-    most = max(kernel.computed + kernel.crossing for kernel in kernels)
-    tile = 16 if 8 * 16 * most <= SCRATCH else 8  # the rows of a short tile stay in the first cache
-    return CSpec(spec.robot, tuple(_header(spec)), tuple(kernels), tile, len(spec.robot.joints))
 
 
 def _kernel(regrouping: Regrouping, model: Model) -> Kernel:
@@ -191,33 +173,27 @@ def _header(spec: ModuleSpec) -> list[str]:
     ]
 
 
-def layout(spec: CSpec) -> list[dict[str, object]]:
-    """The kernels with their C signatures written out."""
-    n = spec.joints
-    laid: list[dict[str, object]] = []
-    for k in spec.kernels:
-        model = k.model
-        pointers = [*model.states, *(["X"] if model.reads_X else []), "constants"]
-        given = ["const double *restrict X"] * k.needs_X + ["const double *restrict constants"] * k.needs_constants
-        tile = [*(f"double {s}[restrict {n}][TILE]" for s in k.used), *given, f"double {model.result}[restrict {k.computed}][TILE]"]
-        arguments = [f"{s}_tile" for s in k.used] + ["X"] * k.needs_X + ["constants"] * k.needs_constants + [model.result]
-        own = ["int64_t N", *(f"const double *{p}" for p in pointers), "double *S", "int32_t flags"]
-        partly = "; only rows that are not constant" if model.name == "regressor" else ""
-        laid.append(
-            {
-                **vars(k),
-                "name": model.name,
-                "result": model.result,
-                "summary": f"{model.summary}. S has shape ({', '.join(map(str, model.axes))}, N){partly}",
-                "tile_prototype": signature(f"KERNEL static void {model.name}_lanes", tile),
-                "part_functions": _part_functions(k, n),
-                "tile_arguments": ", ".join(arguments),
-                "prototype": signature(f"int32_t {spec.robot.name}_{model.name}", own),
-                "scratch": ", ".join([*(f"{s}_tile[{n}][TILE]" for s in k.used), f"{model.result}[{k.computed}][TILE]"]),
-                "missing": _missing([*pointers, "S"]),
-            }
-        )
-    return laid
+def _layout(spec: ModuleSpec, k: Kernel) -> dict[str, object]:
+    """A kernel with its C signatures written out."""
+    n, model = len(spec.robot.joints), k.model
+    pointers = [*model.states, *(["X"] if model.reads_X else []), "constants"]
+    given = ["const double *restrict X"] * k.needs_X + ["const double *restrict constants"] * k.needs_constants
+    tile = [*(f"double {s}[restrict {n}][TILE]" for s in k.used), *given, f"double {model.result}[restrict {k.computed}][TILE]"]
+    arguments = [f"{s}_tile" for s in k.used] + ["X"] * k.needs_X + ["constants"] * k.needs_constants + [model.result]
+    own = ["int64_t N", *(f"const double *{p}" for p in pointers), "double *S", "int32_t flags"]
+    partly = "; only rows that are not constant" if model.name == "regressor" else ""
+    return {
+        **vars(k),
+        "name": model.name,
+        "result": model.result,
+        "summary": f"{model.summary}. S has shape ({', '.join(map(str, model.axes))}, N){partly}",
+        "tile_prototype": signature(f"KERNEL static void {model.name}_lanes", tile),
+        "part_functions": _part_functions(k, n),
+        "tile_arguments": ", ".join(arguments),
+        "prototype": signature(f"int32_t {spec.robot.name}_{model.name}", own),
+        "scratch": ", ".join([*(f"{s}_tile[{n}][TILE]" for s in k.used), f"{model.result}[{k.computed}][TILE]"]),
+        "missing": _missing([*pointers, "S"]),
+    }
 
 
 def _missing(pointers: Sequence[str]) -> str:
@@ -243,9 +219,9 @@ def _part_functions(k: Kernel, n: int) -> list[dict[str, object]]:
     return laid
 
 
-def signals_layout(spec: CSpec) -> dict[str, object]:
+def _signals_layout(spec: ModuleSpec, regressor: Kernel) -> dict[str, object]:
     """The function that gives the distinct signals of the regressor, with its table of entries."""
-    states = spec.kernels[0].model.states
+    states = regressor.model.states
     pointers = [f"const double *{s}" for s in states]
     own = ["int64_t m", *pointers, "int64_t stride", "const double *constants", "double *U", "int64_t ustride"]
     return {"prototype": signature(f"int32_t {spec.robot.name}_signals", own), "missing": _missing([*states, "constants", "U"])}

@@ -19,27 +19,20 @@ from types import ModuleType
 
 import numpy as np
 
-from symgen.derive.columns import element_names
 from symgen.derive.exact import Array
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.emit.generate import generate_files
+from symgen.emit.header import one_sided_friction_that_absorbs
 from symgen.emit.importing import cached_path, imported, stored_path
-from symgen.errors import SymgenError
-from symgen.regroup.certificate import TOLERANCE, Certificate, certify_formulas, independent
+from symgen.emit.targets import TARGETS
+from symgen.errors import CertificateError, SymgenError
+from symgen.regroup.certificate import Certificate, certify_formulas, independent
 from symgen.regroup.regrouping import Regrouping, regroup
 
 STATES = 5  # for the models that are one column of the regressor each
 SMALL = 1e-6  # of the largest entry: regressor columns below are compared with that
-PYTHON = ("numpy", "casadi", "xp")  # targets that Python imports
-
-
-class CertificateError(SymgenError):
-    """A certificate that does not hold; `certificate` tells which check."""
-
-    def __init__(self, message: str, certificate: Certificate) -> None:
-        self.certificate = certificate
-        super().__init__(message)
+PYTHON = tuple(name for name, target in TARGETS.items() if target.file.endswith(".py"))  # targets that Python imports
 
 
 def certify(regrouping: Regrouping, text: str | None = None) -> Certificate:
@@ -158,15 +151,6 @@ def module_errors(module: ModuleType, regrouping: Regrouping) -> dict[str, float
         "bias": (module.bias(q, qd, X) - torque(qd, rest), largest),
         "gravity": (module.gravity(q, X) - at_rest, largest),
     }
-    if friction_absorbs(regrouping):
+    if one_sided_friction_that_absorbs(regrouping):
         del differences["gravity"]
     return {name: float(np.max(np.abs(difference) / scale)) for name, (difference, scale) in differences.items()}
-
-
-def friction_absorbs(regrouping: Regrouping) -> bool:
-    """Whether one-sided friction stands for a constant force too, so that torques at rest are not those of the mechanism."""
-    elements = element_names(regrouping.robot)
-    return any(b.name != b.own and b.own in elements and elements[b.own][0].when is not None for b in regrouping.base)
-
-
-__all__ = ["TOLERANCE", "CertificateError", "certified_files", "certify", "model", "module_errors", "require_valid"]

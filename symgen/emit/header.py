@@ -12,6 +12,7 @@ from symgen.derive.names import FAMILIES
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.spec import WIDTH, ModuleSpec, unit
+from symgen.regroup.regrouping import Regrouping
 
 COLUMNS = ("j", "ant", "mu", "sigma", "gamma", "b", "alpha", "d", "theta", "r")
 
@@ -39,7 +40,7 @@ def header(spec: ModuleSpec) -> list[str]:
     if alone:
         lines += wrapped("as they are: " + " ".join(alone), "    ")
     lines += wrapped("No effect: " + (" ".join(regrouping.no_effect) or "none"), "")
-    absorbing = one_sided_friction_that_absorbs(spec)
+    absorbing = one_sided_friction_that_absorbs(regrouping)
     if absorbing:
         lines += wrapped(
             f"In motion only: {' '.join(absorbing)} take in a constant force that no offset tells from friction; at rest, "
@@ -60,10 +61,10 @@ def families(spec: ModuleSpec) -> list[str]:
     return [family for family in FAMILIES if family in occurring]
 
 
-def one_sided_friction_that_absorbs(spec: ModuleSpec) -> list[str]:
+def one_sided_friction_that_absorbs(regrouping: Regrouping) -> list[str]:
     """Base parameters of one-sided Coulomb friction that stand for a weight too: D_FSP - D_FSN = 1 in motion, 0 at rest."""
-    elements = element_names(spec.robot)
-    return [b.name for b in spec.regrouping.base if b.name != b.own and b.own in elements and elements[b.own][0].when]
+    elements = element_names(regrouping.robot)
+    return [b.name for b in regrouping.base if b.name != b.own and b.own in elements and elements[b.own][0].when]
 
 
 def frame_table(robot: Robot) -> list[str]:

@@ -209,7 +209,7 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
 def degree(regrouping: Regrouping) -> int:
     """A bound on the degree of the column identities in all random variables: half-angle tangents, lengths, rates, directions.
 
-    An entry of the regressor passes each frame of a path at most twice, outwards and back, with two rotations and a displacement each.
+    An entry of the regressor passes each frame of a path at most three times: outwards in products of two velocities, and back.
     """
     robot, closure, units = regrouping.robot, close(regrouping.robot), units_of(regrouping.robot)
 
@@ -231,7 +231,7 @@ def degree(regrouping: Regrouping) -> int:
     path = max((sum(frame(robot.frame(i)) for i in robot.path(f.j)) for f in robot.frames), default=0)
     rows = [g for e in robot.elements for table in (e.along, e.form) for row in table.values() for g in row.values()]
     coefficients = max((constant(c) for b in regrouping.base for c in b.combination.values()), default=0)
-    return 2 * path + 3 + 2 * max(map(constant, rows), default=0) + coefficients
+    return 3 * path + 3 + 2 * max(map(constant, rows), default=0) + coefficients
 
 
 def _modulo(regrouping: Regrouping, seed: int, p: int, sampler: Sampler) -> tuple[int, list[str]]:

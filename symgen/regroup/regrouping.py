@@ -102,8 +102,8 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     dependent = [c for c in range(len(names)) if c not in pivots]
     supports = {names[c]: tuple(base[k] for k in range(len(base)) if R[k, c]) for c in dependent}
     exact, missing = coefficients(robot, supports)
-    found = exact | {name: numeric_coefficients(given, name, supports[name]) for name in missing}
-    relations = {name: dict(zip(supports[name], found.get(name, []), strict=True)) for name in supports}
+    betas = exact | {name: numeric_coefficients(given, name, supports[name]) for name in missing}
+    relations = {name: dict(zip(supports[name], betas.get(name, []), strict=True)) for name in supports}
     regrouping = _assemble(robot, transfer, base, relations, draw)
     return replace(regrouping, robot=given, method=NUMERIC if missing else EXACT)
 

@@ -21,9 +21,9 @@ from symgen.cli.main import app
 from symgen.derive.lagrange import Lagrange
 from symgen.description import load_robot, packaged_robots
 from symgen.emit import importing
-from symgen.emit.certified import CertificateError, certified_files, certify, model, require_valid
+from symgen.emit.certified import certified_files, certify, model, require_valid
 from symgen.emit.generate import generate_files, generate_module
-from symgen.errors import SymgenError
+from symgen.errors import CertificateError, SymgenError
 from symgen.regroup.regrouping import regroup
 
 ROBOT = """
@@ -94,6 +94,8 @@ def test_nothing_is_generated_where_the_module_is_wrong(monkeypatch, cache) -> N
         ) as error:
             act(load_robot("scara"))
         assert not error.value.certificate.valid
+    result = CliRunner().invoke(app, ["generate", "scara", "-o", str(cache)])
+    assert result.exit_code == 1 and "regressor of the emitted module" in result.stderr and "Traceback" not in result.output
     assert not cache.exists()
 
 

@@ -18,7 +18,8 @@ from runtime.observation.filters import filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, select_rows
 from runtime.resolution.cestac import cestac, key_blocks, levels_of
 from runtime.resolution.perturbed import perturbed_position, perturbed_torque
-from runtime.resolution.result import Level, Run, Runs, deciding_names, level_result, runs_needed
+from runtime.resolution.result import deciding_names, level_result, runs_needed
+from runtime.resolution.runs import Level, Run, Runs
 from runtime.settings.study import CestacSettings, EstimateSettings, Lowpass, Signals, Study
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20))

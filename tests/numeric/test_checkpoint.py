@@ -18,7 +18,7 @@ from planar_data import record
 from runtime.errors import InputError
 from runtime.resolution.cestac import cestac
 from runtime.resolution.checkpoint import Checkpoint
-from runtime.resolution.result import Run, Runs
+from runtime.resolution.runs import Run, Runs
 from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
 
 RECORD = record(N=3000)

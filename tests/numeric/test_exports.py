@@ -17,12 +17,13 @@ import scipy.io
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime import InputError
-from runtime.estimators.methods import estimate_of
 from runtime.estimators.estimate import Estimate, load_estimate
+from runtime.estimators.methods import estimate_of
 from runtime.json_documents import schema_text
 from runtime.latex import escaped, level_cell, name_cell, number_cell, unit_cell
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays, mat, matlab_names, npz
-from runtime.resolution.result import Cestac, Level, Run, Runs, level_result
+from runtime.resolution.result import Cestac, level_result
+from runtime.resolution.runs import Level, Run, Runs
 
 HOSTILE = ("\\input{/etc/passwd}", "a%b", "$x$ & ^^M # ~ _", "\\end{tabular}\\write18{ls}", "é Δ 中\n\x00\u202e", "{", 'end"<b>|')
 NUMBERS = ("X", "sigma", "covariance", "sigma_corrected", "relative_sigma")

@@ -22,7 +22,7 @@ from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
 from runtime.resolution.perturbed import perturbed_position
-from runtime.resolution.result import NORMAL, TRIANGULAR
+from runtime.resolution.runs import NORMAL, TRIANGULAR
 from runtime.settings.study import CestacSettings, Decimate, EstimateSettings, Lowpass, Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
 

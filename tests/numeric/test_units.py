@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pint
@@ -12,7 +13,6 @@ from hypothesis import strategies as st
 
 from runtime import read_record
 from runtime.errors import InputError, SettingsError
-from runtime.model.drives import Drives
 from runtime.settings.study import study_from_mapping
 from runtime.settings.units import GRAMMAR, SI, TABLE, position_unit, speed, time_unit, torque_unit
 
@@ -124,8 +124,9 @@ def test_degrees_and_milliampere(tmp_path):
         "units": {"t": "us", "q": "degree", "tau": "mA"},
         "side": "motor",
     }
-    drives = Drives(np.diag([50.0, -80.0]), 0.0, [0.06, 0.08])
-    found = read_record(study_from_mapping({"record": record}).record[0], drives, folder=tmp_path)
+    drives = {"ratio": np.diag([50.0, -80.0]), "offset": [0.0, 0.0], "torque_constant": [0.06, 0.08]}
+    robot = SimpleNamespace(NAME="arm", JOINTS=(1, 2), DRIVES=drives)
+    found = read_record(study_from_mapping({"record": record}).record[0], robot, folder=tmp_path)
     np.testing.assert_allclose(found.q, q / [50, -80], rtol=1e-15)
     np.testing.assert_allclose(found.tau, current * [3.0, -6.4], rtol=1e-15)
     assert found.rate == pytest.approx(250)

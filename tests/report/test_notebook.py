@@ -12,7 +12,8 @@ from nbclient import NotebookClient
 
 from runtime.estimators.estimate import Estimate, JointFit
 from runtime.observation.observation import Observation
-from runtime.resolution.result import Cestac, Level, Run, Runs, level_result
+from runtime.resolution.result import Cestac, level_result
+from runtime.resolution.runs import Level, Run, Runs
 from symgen.description import load_robot
 from symgen.regroup.regrouping import regroup
 

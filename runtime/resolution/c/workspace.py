@@ -20,8 +20,8 @@ from runtime.resolution.c import kernels
 from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.self_test import unavailable
 from runtime.resolution.perturbed import PreparedRecord, Task, perturbed_position, stream_keys, torque_rows
-from runtime.resolution.result import Level
 from runtime.resolution.rounding import bits, stream
+from runtime.resolution.runs import Level
 
 Array = np.ndarray
 

@@ -1,0 +1,123 @@
+"""Levels of a resolution study and their runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+Array = np.ndarray
+
+NORMAL, TRIANGULAR = "normal equations", "triangular factor"
+"""How the least squares of a run was solved."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run.
+
+    Attributes
+    ----------
+    level : int
+        Number of the level, from 0.
+    run : int
+        Number of the run, from 0.
+    X : tuple of float, SI
+        Parameters in column order.
+    residual_norm : float, N m or N
+        ||Y - W_CESTAC X||.
+    method : str
+        How the least squares was solved: NORMAL or TRIANGULAR.
+    """
+
+    level: int
+    run: int
+    X: tuple[float, ...]
+    residual_norm: float
+    method: str = TRIANGULAR
+
+
+@dataclass(frozen=True, eq=False)
+class Runs(Sequence[Run]):
+    """R runs as arrays, which is what travels between processes and lies on disk.
+
+    Attributes
+    ----------
+    level, run : ndarray of int, shape (R,)
+    X : ndarray, shape (R, b)
+    residual_norm : ndarray, shape (R,), N m
+    normal : ndarray of bool, shape (R,)
+        Whether the run was solved by normal equations.
+    """
+
+    level: Array
+    run: Array
+    X: Array
+    residual_norm: Array
+    normal: Array
+
+    @classmethod
+    def of(cls, runs: Sequence[Run], b: int) -> Runs:
+        """Runs with b parameters each."""
+        return cls(
+            np.array([run.level for run in runs], dtype=np.int64),
+            np.array([run.run for run in runs], dtype=np.int64),
+            np.array([run.X for run in runs], dtype=float).reshape(len(runs), b),
+            np.array([run.residual_norm for run in runs], dtype=float),
+            np.array([run.method == NORMAL for run in runs], dtype=bool),
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Runs], b: int) -> Runs:
+        """All runs of the parts, by level and number; of a run that comes twice, the first."""
+        parts = [cls.of((), b), *parts]
+        fields = [np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__]
+        _, first = np.unique(np.stack(fields[:2]), axis=1, return_index=True)
+        return cls(*(field[first] for field in fields))
+
+    def where(self, selected: Array) -> Runs:
+        """The selected runs; bool of shape (R,), or numbers."""
+        return Runs(*(getattr(self, name)[selected] for name in self.__dataclass_fields__))
+
+    @property
+    def keys(self) -> set[tuple[int, int]]:
+        """(level, run) of every run."""
+        return set(zip(self.level.tolist(), self.run.tolist(), strict=True))
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+    def __getitem__(self, i: int) -> Run:  # type: ignore[override]
+        method = NORMAL if self.normal[i] else TRIANGULAR
+        return Run(int(self.level[i]), int(self.run[i]), tuple(self.X[i].tolist()), float(self.residual_norm[i]), method)
+
+    def __iter__(self) -> Iterator[Run]:
+        return (self[i] for i in range(len(self)))
+
+
+@dataclass(frozen=True)
+class Level:
+    """Steps of one column of the study; 0 means not perturbed.
+
+    Attributes
+    ----------
+    delta : float, rad or m
+        Step of the position.
+    torque : float, N m or N
+        Step of the motor torque.
+    """
+
+    delta: float
+    torque: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """Such as `2*pi/10000`, or `Phi 0.01` for a torque."""
+        parts = []
+        if self.delta:
+            counts = 2 * np.pi / self.delta
+            parts.append(f"2*pi/{counts:.0f}" if counts >= 2 and abs(counts - round(counts)) < 1e-9 * counts else f"{self.delta:.4g}")
+        if self.torque:
+            parts.append(f"Phi {self.torque:.4g}")
+        return " + ".join(parts) or "none"
