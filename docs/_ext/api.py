@@ -134,7 +134,7 @@ def room(package: str) -> str:
 
 def described_in_full(value: Any) -> Iterator[str]:
     """Signature, docstring and, of a class, its methods and properties."""
-    yield f"```python\n{signature(value)}\n```"
+    yield f"```text\n{signature(value)}\n```"
     yield markdown(value.__doc__)
     if inspect.isclass(value):
         methods = [described_method(name, member) for name, member in vars(value).items() if not name.startswith("_")]
@@ -211,7 +211,7 @@ def names(package: str) -> str:
         described_here = (
             list(described_in_full(thing))
             if inspect.isfunction(thing)
-            else [f"```python\n{signature(thing)}\n```", markdown(thing.__doc__)]
+            else [f"```text\n{signature(thing)}\n```", markdown(thing.__doc__)]
         )
         parts += [f"### `{name}`", *described_here, f"More of this room: [{home}]({home}.md)." if f"{package}.{home}" in rooms() else ""]
     return "\n\n".join(part for part in [table(("name", ""), rows).strip(), *parts] if part) + "\n"

@@ -55,6 +55,6 @@ def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record |
         return wanted.joint_position(used.motor_position(q)), wanted.joint_torque(used.motor_command(tau))
 
     if not isinstance(record, Record):
-        return ChangedStream(record, change)
+        return ChangedStream.of(record, change)
     q, tau = change(record.q, record.tau)
     return replace(record, q=q, tau=tau)

@@ -21,6 +21,7 @@ from runtime.errors import ModelError
 
 LONGEST, MOST_WORDS = 20_000_000, 800_000  # characters; words and marks, each up to a kilobyte of syntax tree
 MOST_POWER = 100  # robot files have exponents up to 32
+MOST_DIGITS = 18  # of the power of a whole number
 
 
 def _words(text: str) -> frozenset[str]:
@@ -143,7 +144,9 @@ class _Shape:
     def of_binop(self, node: ast.BinOp) -> None:
         exponent = node.right.operand if isinstance(node.right, ast.UnaryOp) else node.right
         written = isinstance(exponent, ast.Constant) and isinstance(exponent.value, int) and exponent.value <= MOST_POWER
-        if isinstance(node.op, ast.Pow) and (not written or isinstance(node.left, ast.Constant)):
+        base = node.left.value if isinstance(node.left, ast.Constant) else 0.0
+        short = isinstance(base, float) or (type(base) is int and written and len(str(base)) * exponent.value <= MOST_DIGITS)
+        if isinstance(node.op, ast.Pow) and not (written and short):
             self.refuse(node, f"a power that emitted models do not take; their exponents are numbers up to {MOST_POWER}")
 
     def of_name(self, node: ast.Name) -> None:

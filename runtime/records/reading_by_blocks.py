@@ -7,7 +7,7 @@ The same settings, checks and errors; hashes and the clock are read when the str
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -32,41 +32,17 @@ KEPT = 2**23  # samples whose time is kept, 64 MB; read again and again in longe
 LARGE = 100_000_000  # bytes of the files of a record from which it is read by blocks when nothing is said
 
 
-@dataclass(frozen=True, eq=False)
-class FileStream:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FileStream(Stream):
     """A record in files, read by blocks.
 
     Attributes
     ----------
     opened : RecordFiles
         The files.
-    rate : float
-        Sampling rate, Hz.
-    block : int
-        Samples of a block.
     """
 
     opened: RecordFiles
-    rate: float
-    block: int
-
-    @property
-    def name(self) -> str:
-        """Name of the record."""
-        return self.opened.name
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return self.opened.n
-
-    @property
-    def files(self) -> Mapping[str, str]:
-        """SHA-256 by file name."""
-        return self.opened.hashes
-
-    def __len__(self) -> int:
-        return self.opened.samples
 
     def times(self) -> Iterator[Array]:
         """Time of the samples, s, by blocks."""
@@ -119,11 +95,12 @@ def _stream(settings: RecordSettings, label: Label, drives: Drives | None, folde
     if settings.resample is not None:
         raise InputError("record.resample needs the whole record; set stream: off", file=", ".join(label.files))
     opened = open_record(settings, label, drives, folder, by_blocks=True)
+    rate = settings.rate
     if opened.columns.t is not None:
-        return FileStream(opened, clock(opened.stamps, lambda: opened.times(block)), block)
-    if settings.rate is None:
+        rate = clock(opened.stamps, lambda: opened.times(block))
+    if rate is None:
         raise InputError("no time column and no rate; set record.rate (Hz) or record.columns.t", file=opened.first.file)
-    return FileStream(opened, settings.rate, block)
+    return FileStream(name=opened.name, n=opened.n, rate=rate, files=opened.hashes, samples=opened.samples, block=block, opened=opened)
 
 
 def records_or_streams(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -13,123 +13,82 @@ from runtime.records.record import Record
 Array = np.ndarray
 
 
-class Stream(Protocol):
-    """A record that is read by blocks, joint side, SI, as often as asked."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stream(ABC):
+    """A record that is read by blocks, joint side, SI, as often as asked.
 
-    @property
-    def name(self) -> str:
-        """Name of the record."""
+    Attributes
+    ----------
+    name : str
+        Name of the record.
+    n : int
+        Number of joints.
+    rate : float, Hz
+        Sampling rate.
+    files : mapping of str to str
+        SHA-256 by file name.
+    samples : int
+        N.
+    block : int
+        Samples of a block.
+    """
 
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-
-    @property
-    def rate(self) -> float:
-        """Sampling rate, Hz."""
-
-    @property
-    def files(self) -> Mapping[str, str]:
-        """SHA-256 by file name."""
-
-    @property
-    def block(self) -> int:
-        """Samples of a block."""
+    name: str
+    n: int
+    rate: float
+    files: Mapping[str, str]
+    samples: int
+    block: int
 
     def __len__(self) -> int:
-        """Number of samples."""
+        return self.samples
 
+    @abstractmethod
     def times(self) -> Iterator[Array]:
         """Time of the samples, s, by blocks."""
 
+    @abstractmethod
     def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
         """t (B,), q (B, n), tau (B, n)."""
 
 
-@dataclass(frozen=True, eq=False)
-class RecordStream:
+@dataclass(frozen=True, eq=False, init=False)
+class RecordStream(Stream):
     """A Record in memory, read by blocks of `block` samples."""
 
     record: Record
-    block: int
 
-    @property
-    def name(self) -> str:
-        """Name of the record."""
-        return self.record.name
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return self.record.n
-
-    @property
-    def rate(self) -> float:
-        """Sampling rate, Hz."""
-        return self.record.rate
-
-    @property
-    def files(self) -> Mapping[str, str]:
-        """SHA-256 by file name."""
-        return self.record.files
-
-    def __len__(self) -> int:
-        return len(self.record)
+    def __init__(self, record: Record, block: int) -> None:
+        super().__init__(name=record.name, n=record.n, rate=record.rate, files=record.files, samples=len(record), block=block)
+        object.__setattr__(self, "record", record)
 
     def times(self) -> Iterator[Array]:
-        """Time of the samples, s, by blocks."""
-        return (self.record.t[a : a + self.block] for a in range(0, len(self), self.block))
+        return (t for t, _, _ in self.blocks())
 
     def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
-        """t, q, tau by blocks."""
         for a in range(0, len(self), self.block):
             samples = slice(a, a + self.block)
             yield self.record.t[samples], self.record.q[samples], self.record.tau[samples]
 
 
-@dataclass(frozen=True, eq=False)
-class ChangedStream:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ChangedStream(Stream):
     """A stream whose positions and torques are changed, sample by sample: change(q, tau) of arrays (B, n)."""
 
     stream: Stream
     change: Callable[[Array, Array], tuple[Array, Array]]
 
-    @property
-    def name(self) -> str:
-        """Name of the record."""
-        return self.stream.name
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return self.stream.n
-
-    @property
-    def rate(self) -> float:
-        """Sampling rate, Hz."""
-        return self.stream.rate
-
-    @property
-    def files(self) -> Mapping[str, str]:
-        """SHA-256 by file name."""
-        return self.stream.files
-
-    @property
-    def block(self) -> int:
-        """Samples of a block."""
-        return self.stream.block
-
-    def __len__(self) -> int:
-        return len(self.stream)
+    @classmethod
+    def of(cls, stream: Stream, change: Callable[[Array, Array], tuple[Array, Array]]) -> ChangedStream:
+        """The changed stream."""
+        same = {f.name: getattr(stream, f.name) for f in fields(Stream)}
+        return cls(stream=stream, change=change, **same)
 
     def times(self) -> Iterator[Array]:
-        """Time of the samples, s, by blocks."""
         return self.stream.times()
 
     def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
-        """t, q, tau by blocks."""
-        for t, q, tau in self.stream.blocks():
-            yield t, *self.change(q, tau)
+        return ((t, *self.change(q, tau)) for t, q, tau in self.stream.blocks())
 
 
 class Queue:

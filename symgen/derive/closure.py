@@ -27,14 +27,27 @@ ActiveRow = tuple[tuple[int, Expression], ...]
 
 @dataclass(frozen=True)
 class Closure:
-    """`row[j]`, `offset[j]`: moving joint j in the independent joints; `tied`: independent passive joints (general loops)."""
+    """Every moving joint in the independent ones.
+
+    Attributes
+    ----------
+    robot : Robot
+        The mechanism.
+    row : mapping
+        {j: {i: n_ji}}.
+    offset : mapping
+        {j: c_j}, rad or m.
+    tied : tuple of int
+        Independent passive joints: those of general loops.
+    start : mapping
+        A configuration of all moving joints that closes the loops, rad or m; it picks the assembly mode of a general loop.
+    """
 
     robot: Robot
     row: Mapping[int, Mapping[int, Expression]]
     offset: Mapping[int, Expression]
     tied: tuple[int, ...] = ()
     start: Mapping[int, float] = field(default_factory=dict)
-    """A configuration of all moving joints that closes the loops; it picks the assembly mode of a general loop."""
 
     @property
     def independent(self) -> tuple[int, ...]:

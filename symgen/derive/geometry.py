@@ -19,7 +19,15 @@ from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
 @dataclass(frozen=True)
 class Rotation:
-    """A Rot(z, theta); A is None for the identity."""
+    """A Rot(z, theta).
+
+    Attributes
+    ----------
+    A : Matrix or None
+        Rot(z, gamma) Rot(x, alpha); None for the identity.
+    c, s : Scalar
+        cos theta and sin theta.
+    """
 
     A: Matrix | None
     c: Scalar
@@ -38,7 +46,17 @@ class Rotation:
 
 @dataclass(frozen=True)
 class Carrier:
-    """Frame m of which frame j is turned by `rotation`, about z_j, by the angle `turn` of independent joints."""
+    """The frame from which frame j is reached by one rotation.
+
+    Attributes
+    ----------
+    m : int
+        Number of that frame.
+    rotation : Rotation
+        mRj.
+    turn : Turn
+        The angle about z_j, in the independent joints.
+    """
 
     m: int
     rotation: Rotation
@@ -46,7 +64,7 @@ class Carrier:
 
 
 class Geometry:
-    """Rotations, positions and carriers of all frames of `robot` over the scalars of `algebra`."""
+    """Rotations, positions and carriers of all frames of `robot`, over the scalars of `algebra`."""
 
     def __init__(self, robot: Robot, algebra: Algebra, closure: Closure) -> None:
         self.robot, self.algebra, self.closure = robot, algebra, closure

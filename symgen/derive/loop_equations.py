@@ -42,13 +42,24 @@ def residuals(robot: Robot, algebra: Algebra, closure: Closure) -> list[Scalar]:
 
 @dataclass(frozen=True)
 class LoopSystem:
-    """The equations of a robot with tied joints."""
+    """The closure equations of a robot with tied joints.
+
+    Attributes
+    ----------
+    robot : Robot
+        The mechanism.
+    closure : Closure
+        Its joints in the independent ones.
+    equations : tuple of int
+        Rows of `residuals` that are used, as many as there are tied joints.
+    """
 
     robot: Robot
     closure: Closure
     equations: tuple[int, ...]
 
     def residual(self, algebra: Algebra) -> list[Scalar]:
+        """r(q)."""
         rows = residuals(self.robot, algebra, self.closure)
         return [rows[k] for k in self.equations]
 

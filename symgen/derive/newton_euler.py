@@ -29,21 +29,42 @@ TWO = Expression.number(2)
 
 @dataclass(frozen=True)
 class LinkMotion:
-    """Motion of one link, in its frame."""
+    """Motion of one link, in its frame.
+
+    Attributes
+    ----------
+    w, wd : Vector
+        Angular velocity (rad/s) and acceleration (rad/s**2).
+    DV : Matrix
+        w_k w_l.
+    DW : Vector
+        (w2**2 - w3**2, w3**2 - w1**2, w1**2 - w2**2).
+    U : Matrix
+        skew(wd) + skew(w)**2.
+    a : Vector
+        Acceleration of the origin minus gravity, m/s**2.
+    """
 
     w: Vector
     wd: Vector
-    DV: Matrix  # w_k w_l
-    DW: Vector  # (w2**2 - w3**2, w3**2 - w1**2, w1**2 - w2**2)
+    DV: Matrix
+    DW: Vector
     U: Matrix
     a: Vector
 
 
 class Motion:
-    """Outward recursion. q, qd, qdd of the actuated joints move the whole tree.
+    """Outward recursion: q, qd, qdd of the actuated joints move the whole tree.
 
-    `gravity`, `velocity`, `acceleration` leave their part out; `unit` = j moves actuated joint j alone, from rest, with qdd_j = 1 and
-    without gravity: a column of the inertia matrix. Its steps are named with j as last index.
+    Parameters
+    ----------
+    geometry : Geometry
+        Rotations and positions of the frames.
+    gravity, velocity, acceleration : bool
+        Whether that part of the motion is there.
+    unit : int or None
+        Actuated joint that alone accelerates, from rest, with qdd = 1 and without gravity: its torques are a column of the inertia matrix. The
+        steps are then named with this joint as last index.
     """
 
     def __init__(

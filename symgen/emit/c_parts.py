@@ -19,7 +19,17 @@ DEFINED = re.compile(r"const double (\w+) = ")
 
 @dataclass(frozen=True)
 class Part:
-    """A function over one tile: what stands before its loop, the sections of the loop, and every identifier in them."""
+    """A function over one tile.
+
+    Attributes
+    ----------
+    before : tuple of str
+        Lines before its loop.
+    sections : tuple of Section
+        Lines of the loop.
+    words : frozenset of str
+        Every identifier in them.
+    """
 
     before: tuple[str, ...]
     sections: tuple[Section, ...]

@@ -30,18 +30,44 @@ RESULTS = ("n", "b")  # axes of the models that have a kernel: torques and matri
 
 @dataclass(frozen=True)
 class Kernel:
-    """One function of the C file; `rows` holds {row of the store, signal, sign}, `count` of them written by the function itself."""
+    """One function of the C file.
+
+    Attributes
+    ----------
+    model : Model
+        What it evaluates.
+    used : tuple of str
+        Among q, qd, qdd: those that it reads.
+    needs_X, needs_constants : bool
+        Whether it reads base parameters and constants.
+    before : tuple of str
+        Lines before its loops.
+    trigonometry : tuple of Section
+        Loops of their own: compilers merge sin(x) and cos(x) of one loop into a call that has no vector form.
+    calls : int
+        Number of sines and cosines.
+    sections : tuple of Section
+        The loop over a tile.
+    parts : tuple of Part
+        The same, divided, where it is long.
+    crossing : int
+        Rows of V, which the parts hand over.
+    rows : tuple of str
+        {row of the store, signal, sign}, as source.
+    entries, count, computed : int
+        Entries of the store, those that the function writes, and distinct signals.
+    """
 
     model: Model
     used: tuple[str, ...]
     needs_X: bool
     needs_constants: bool
     before: tuple[str, ...]
-    trigonometry: tuple[Section, ...]  # apart: compilers merge sin(x) and cos(x) of one loop into a call that has no vector form
+    trigonometry: tuple[Section, ...]
     calls: int
     sections: tuple[Section, ...]
-    parts: tuple[Part, ...]  # of the sections, where those are long
-    crossing: int  # rows of V, which the parts hand over
+    parts: tuple[Part, ...]
+    crossing: int
     rows: tuple[str, ...]
     entries: int
     count: int

@@ -54,7 +54,17 @@ class ArrayText(Text):
 
 @dataclass(frozen=True)
 class Block:
-    """One function of the module: reads states of shape (..., n), returns a tuple of arrays of shape (...)."""
+    """One function of the module: reads states of shape (..., n), returns a tuple of arrays of shape (...).
+
+    Attributes
+    ----------
+    name, arguments, summary : str
+        Its signature and docstring.
+    sections : tuple of Section
+        Its lines.
+    results : tuple of str
+        The entries of the tuple.
+    """
 
     name: str
     arguments: str

@@ -55,12 +55,26 @@ class BaseParameter:
 
 @dataclass(frozen=True)
 class Regrouping:
-    """The base parameters of a robot in the order of eq. (4), and the standard parameters without effect."""
+    """The base parameters of a robot.
+
+    Attributes
+    ----------
+    robot : Robot
+        The robot.
+    base : tuple of BaseParameter
+        In the order of eq. (4).
+    no_effect : tuple of str
+        Standard parameters that enter no base parameter.
+    steps : tuple of (from, into, coefficient)
+        The recursive form: each standard parameter that goes, and where.
+    method : str
+        How the coefficients were derived: EXACT, RECOGNISED or NUMERIC.
+    """
 
     robot: Robot
     base: tuple[BaseParameter, ...]
     no_effect: tuple[str, ...]
-    steps: tuple[Step, ...] = field(repr=False, default=())  # recursive form: (from, into, coefficient)
+    steps: tuple[Step, ...] = field(repr=False, default=())
     method: str = EXACT
 
     @property
@@ -89,7 +103,22 @@ class Regrouping:
 
 
 def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
-    """Derive the base parameters of `robot`. `seed` changes the random draws, never the result."""
+    """The base parameters of a robot with their formulas.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    seed : int
+        Of the random draws over F_p; it never changes the result.
+
+    Raises
+    ------
+    DescriptionError
+        The loops cannot close.
+    SymgenError
+        A general loop closes in too few states near its start.
+    """
     given, robot = robot, numbered(robot)
     transfer = Transfer(robot)
     names = preference(robot, transfer.kept)

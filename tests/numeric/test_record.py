@@ -2,6 +2,9 @@
 
 import gzip
 import hashlib
+from copy import copy
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -78,6 +81,110 @@ def test_record_refuses(t, q, tau, rate, said):
     with pytest.raises(InputError) as e:
         Record(t, q, tau, rate=rate)
     assert said in str(e.value)
+
+
+@pytest.mark.parametrize("rate", [200.0, 5000.0, 1 / 3])
+def test_rate_comes_from_the_stamps(rate):
+    record = Record(np.arange(N) / rate + 7, Q, TAU)
+    assert record.rate == pytest.approx(rate, rel=1e-12) and record.name == "record"
+    assert Record(record.t, Q, TAU, rate=1.0004 * rate).rate == 1.0004 * rate
+    pieces = replace(record, t=record.t[5:25], q=Q[5:25], tau=TAU[5:25]), copy(record)
+    assert [piece.rate for piece in pieces] == [record.rate] * 2
+
+
+def shuffled(t):
+    return np.concatenate([t[:30], t[30:][::-1]])
+
+
+def late(t):
+    return t + 0.3 / RATE * (np.arange(N) >= 30)
+
+
+@pytest.mark.parametrize(
+    ("t", "rate", "said"),
+    [
+        (T, 10 * RATE, "time runs at 200 Hz, record.rate is 2000 Hz"),
+        (T / 10, RATE, "time runs at 2000 Hz, record.rate is 200 Hz"),
+        (T[::-1], None, "sample 2: time goes from 0.295 s to 0.29 s; expected increasing time"),
+        (shuffled(T), None, "sample 32: time goes from 0.295 s to 0.29 s"),
+        (np.repeat(T[::2], 2), None, "sample 2: time goes from 0 s to 0 s"),
+        (late(T), None, "sample 31: time is not uniform"),
+        (T + 0.5 * (np.arange(N) >= 30), None, "record.resample: {gaps: split} cuts there and interpolates at the stamps"),
+        (T + np.random.default_rng(0).uniform(-0.4, 0.4, N) / RATE, None, "record.resample: {} interpolates at the stamps"),
+    ],
+)
+def test_stamps_that_are_no_clock_are_refused(t, rate, said):
+    """Believed, they made velocities ten times wrong."""
+    with pytest.raises(InputError) as e:
+        Record(t, Q, TAU, rate=rate, name="run")
+    assert said in str(e.value) and str(e.value).startswith("run")
+
+
+def test_jitter_is_allowed_where_it_is_said():
+    assert Record(late(T), Q, TAU, jitter=0.4).rate == pytest.approx(RATE, rel=1e-2)
+    (jittered,) = (replace(Record(late(T), Q, TAU, jitter=0.4), name="again"),)
+    assert jittered.jitter == 0.4
+
+
+# --- names ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("files", "names", "keys"),
+    [
+        (["log.1.csv", "log.2.csv"], ["log.1", "log.2"], ["log.1.csv", "log.2.csv"]),
+        (["day1/run.csv", "day2/run.csv"], ["day1/run", "day2/run"], ["day1/run.csv", "day2/run.csv"]),
+        (["a/x/run.csv", "b/x/run.csv", "c.csv"], ["a/x/run", "b/x/run", "c"], ["a/x/run.csv", "b/x/run.csv", "c.csv"]),
+        (["run.csv", "run.csv"], ["run", "run (2)"], ["run.csv", "run.csv"]),
+    ],
+)
+def test_records_of_several_files_have_names_of_their_own(tmp_path, files, names, keys):
+    """Called by the part up to the first dot, one overwrote the other."""
+    for file in files:
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        write_csv(tmp_path / file)
+    records = read_records([settings(files=file) for file in files], folder=str(tmp_path))
+    assert [record.name for record in records] == names
+    assert [list(record.files) for record in records] == [[key] for key in keys]
+
+
+@pytest.mark.parametrize("folder", [".", Path(), "", None])
+def test_folders_are_texts_or_paths(tmp_path, monkeypatch, folder):
+    write_csv(tmp_path / "run.csv")
+    monkeypatch.chdir(tmp_path)
+    assert len(read_records([settings(files="run.csv")], folder=folder)) == 1
+    assert len(open_stream(settings(files="run.csv"), folder=folder)) == N
+
+
+def test_errors_name_the_file(tmp_path):
+    write_csv(tmp_path / "short.csv", rows=np.column_stack([T, Q, TAU])[:5])
+    write_csv(tmp_path / "run.csv")
+    for read in (read_record, open_stream):
+        with pytest.raises(InputError, match=r"^short\.csv: 5 samples; a record has at least 10"):
+            read(settings(files="short.csv"), folder=tmp_path)
+        with pytest.raises(InputError, match=r"^run\.csv: 2 joints; arm has 3"):
+            read(settings(files="run.csv"), SimpleNamespace(NAME="arm", JOINTS=(1, 2, 3), DRIVES=None), folder=tmp_path)
+
+
+# --- by a path alone --------------------------------------------------------------------------------------------------
+
+
+def test_a_file_a_study_and_a_dataset_are_read_by_name(tmp_path, monkeypatch, emps_data, tx40_data):
+    write_csv(tmp_path / "run.csv")
+    (tmp_path / "study.yaml").write_text("record: {files: [run.csv], units: {q: deg}}\n")
+    for path in (tmp_path / "run.csv", str(tmp_path / "run.csv")):
+        np.testing.assert_array_equal(read_record(path).q, Q)
+    np.testing.assert_allclose(read_record(tmp_path / "study.yaml").q, Q * np.pi / 180)
+    monkeypatch.chdir(tmp_path)
+    np.testing.assert_array_equal(read_record("run.csv").q, Q)
+    assert read_record("emps").name == "emps"
+    with pytest.raises(InputError, match=r"expected a dataset \(tx40, emps\), a study file"):
+        read_record("nothing")
+    with pytest.raises(InputError, match="has no drives"):
+        read_record("tx40")
+    (tmp_path / "two.yaml").write_text("record: [{files: [run.csv]}, {files: [run.csv], name: b}]\n")
+    with pytest.raises(InputError, match="2 records or pieces between gaps; read_records gives them all: run, b"):
+        read_record("two.yaml")
 
 
 # --- kinds of files ---------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from runtime import observe, read_record
 from runtime.errors import InputError
-from runtime.identification.identification import coupling_fits
+from runtime.identification.coupling import coupling_fits
 from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import are_large, open_stream, records_or_streams
 from runtime.records.record import Record
@@ -249,6 +249,6 @@ def test_coupling_of_a_split_record(tmp_path):
     drives = {"ratio": [[10.0, 0.0], [5.0, 10.0]], "offset": [0.0, 0.0], "torque_constant": [1.0, 1.0]}
     model = SimpleNamespace(**{**vars(planar), "DRIVES": drives})
     records = read_records(asked.record, model, folder=tmp_path)
-    fits = coupling_fits(model, asked, records)
+    fits = coupling_fits(model, records, asked, lambda changed: observe(model, changed, asked))
     assert len(records) == 2
     assert set(fits) == {"both", "position", "torque", "none"} and set(fits["both"].provenance["files"]) == {"a.npz"}

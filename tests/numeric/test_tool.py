@@ -16,7 +16,7 @@ from runtime.identification.payload import payload
 from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.model.mount import load_effect, load_of_body, mount, ten_parameters
 from runtime.settings.study import PayloadSettings
-from symgen.description import load_robot, parse
+from symgen.description import load_robot, parse, parse_robot
 from symgen.description.expression import Expression
 from symgen.description.robot import Frame
 from symgen.emit.generate import generate_module
@@ -117,3 +117,35 @@ def test_frames_that_cannot_carry(arm) -> None:
     with pytest.raises(SettingsError, match=r"payload\.frame"):
         payload(tx40, [observe(tx40, record(tx40, {}, 1, 0.0), PAYLOAD_STUDY)] * 1, [object()], PayloadSettings(frame=9))
     assert mount(tx40).link == mount(tx40, 6).link == 6
+
+
+BELT = """
+symgen: 1
+name: belt
+title: two joints in a plane whose viscous friction a belt couples by KR
+gravity: [0, -g, 0]
+constants: {L: 0.4, KR: 0.5, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: 0, d: L, theta: q2, r: 0}
+elements:
+  FV: {kind: viscous, along: all}
+  FVM: {kind: viscous, form: {2: 2*KR*q1*q2}}
+"""
+
+
+def test_conditions_are_those_of_the_constants_given(tmp_path) -> None:
+    """FV1 q1^2 + FV2 q2^2 + 2 KR FVM2 q1 q2 takes power: its matrix held the KR of the robot file whatever was given."""
+    models = {}
+    for ratio in ("0.5", "2.0"):
+        (tmp_path / f"belt_{ratio[0]}.py").write_text(
+            generate_module(parse_robot(BELT.replace("KR: 0.5", f"KR: {ratio}").encode(), "belt.yaml"))
+        )
+        models[ratio] = load_model(tmp_path / f"belt_{ratio[0]}.py")
+    given, expected = physical_model(models["0.5"], {"KR": 2.0}), physical_model(models["2.0"])
+    assert [c.name for c in given.conditions] == [c.name for c in expected.conditions]
+    for one, other in zip(given.conditions, expected.conditions, strict=True):
+        np.testing.assert_array_equal(one.B, other.B)
+    (own,) = (c for c in physical_model(models["0.5"]).conditions if c.name == "viscous of joints 1, 2")
+    (doubled,) = (c for c in given.conditions if c.name == "viscous of joints 1, 2")
+    assert own.B.max() == 1.0 and doubled.B.max() == 2.0

@@ -1,0 +1,136 @@
+"""Seeded faults: each is put into a copy of the checkout, the default tests of its subject run there, and a table says which test catches it.
+
+    python tests/mutations.py [NUMBER ...]        all faults, or those of these numbers; some 20 s each
+
+A fault is a file, a text that stands in it once, the text in its place, and what it means. A fault that no test catches ends the script with code 1; so does
+a text that is no longer there: then choose the fault anew. Golden files stand last among the tests, since they notice any change.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+COPIED = ("symgen", "runtime", "generated", "tests", "docs", "pyproject.toml", "README.md")
+EMITTED = ("oracles/test_emitted_agree.py", "oracles/test_loops_agree.py", "cli/test_generate.py")
+REGROUPED = ("regroup/test_certificate.py", "regroup/test_formulas.py", "regroup/test_loops.py", "cli/test_generate.py")
+SIGNALS = ("numeric/test_signals.py", "numeric/test_decimation.py", "numeric/test_observation.py")
+ESTIMATES = ("numeric/test_estimators.py", "numeric/test_estimate.py")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One seeded fault, and the test files that should catch it, most independent first."""
+
+    file: str
+    old: str
+    new: str
+    meaning: str
+    tests: tuple[str, ...]
+
+
+FAULTS = (
+    # derive
+    Fault("symgen/derive/newton_euler.py", "off(1, 2, sub(DV[0][1], wd[2]))", "off(1, 2, add(DV[0][1], wd[2]))", "sign in U = skew(wd) + skew(w)**2", EMITTED),
+    Fault("symgen/derive/newton_euler.py", "sub(a[1], mul(qd2, w[0]))", "add(a[1], mul(qd2, w[0]))", "sign of the Coriolis term of a prismatic joint", EMITTED),
+    Fault("symgen/derive/newton_euler.py", "self.algebra.constant(-e) for e", "self.algebra.constant(e) for e", "gravity turned", EMITTED),
+    Fault("symgen/derive/newton_euler.py", "dot((YY, sub(XX, ZZ), XZ, XY, -YZ)", "dot((YY, sub(ZZ, XX), XZ, XY, -YZ)", "sign in w x (J w)", EMITTED),
+    Fault("symgen/derive/newton_euler.py", "cross(geometry.P[j], fi)", "cross(fi, geometry.P[j])", "lever of the force on the link before, turned", EMITTED),
+    Fault("symgen/derive/geometry.py", "self.turn[f.ant][1] + offset", "self.turn[f.ant][1]", "constant of an angle sum of parallel axes lost", EMITTED),
+    Fault("symgen/derive/elements.py", 'direction if e.kind == "coulomb" else speed', 'speed if e.kind == "coulomb" else direction', "one-sided Coulomb and viscous friction exchanged", EMITTED),
+    # regroup
+    Fault("symgen/regroup/rules.py", '{("XX", 0): -ONE}', '{("XX", 0): ONE}', "YY goes into XX with the wrong sign", REGROUPED),
+    Fault("symgen/regroup/rules.py", "- p[k] * u[m] -", "+ p[k] * u[m] -", "sign in the parallel axis rule", REGROUPED),
+    Fault("symgen/regroup/rules.py", "f.d * sg + f.r0 * A[1][2]", "f.d * sg - f.r0 * A[1][2]", "y of P_ij with the wrong sign", REGROUPED),
+    Fault("symgen/regroup/finite_field.py", "r = rank + int(below[0])", "r = rank + int(below[-1]) * 0", "a zero pivot is taken", REGROUPED),
+    Fault("symgen/regroup/regrouping.py", 'FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")', 'FIRST_CHOICE = ("XX", "ZZ", "XY", "XZ", "YZ", "MY", "MX")', "another order of preference: other base parameters", REGROUPED),
+    Fault("symgen/regroup/certificate.py", "return not self.failures and self.numeric_valid", "return True or self.numeric_valid", "the certificate says yes to everything", REGROUPED),
+    # emit
+    Fault("symgen/emit/templates/functions.py.jinja", ".reshape({{ b }}, -1).T", ".transpose(0, 2, 1).reshape({{ b }}, -1).T", "rows of W sample by sample instead of joint by joint", EMITTED),
+    Fault("symgen/emit/printers.py", '("-" if s.sign * self._name_sign(s.node) < 0 else "") + self.called', '("-" if s.sign < 0 else "") + self.called', "the sign of a name is forgotten where the name is used", EMITTED),
+    Fault("symgen/emit/python_target.py", "if i <= k}", "if i < k}", "diagonal of an element's form left out of the table of elements", ("emit/test_physical_tables.py", "cli/test_generate.py")),
+    Fault("symgen/emit/c_printer.py", "'above' if bound == 'maximum' else 'below'", "'below' if bound == 'maximum' else 'above'", "one-sided friction of C in the other direction", ("emit/test_c_target.py",)),
+    Fault("symgen/emit/models.py", "D[own[k]][robot.joints[row]]", "D[own[k]][robot.joints[0] if robot.joints[0] in D[own[k]] else robot.joints[row]]", "an entry of another joint in a row of D", EMITTED),
+    # observation
+    Fault("runtime/observation/filters.py", "np.gradient(x, 1 / rate, axis=0", "np.gradient(x, 2 / rate, axis=0", "velocities half as large", SIGNALS),
+    Fault("runtime/observation/filters.py", "floor(CUTOFF * rate / (2 * signals.lowpass.cutoff) + 1e-9)", "floor(CUTOFF * rate / signals.lowpass.cutoff + 1e-9)", "decimation by twice the factor of eq. (13)", SIGNALS),
+    Fault("runtime/observation/filters.py", "np.minimum(a, b), np.minimum(np.maximum(a, b), c)", "np.minimum(a, b), np.minimum(np.minimum(a, b), c)", "the running median is the smaller of two", SIGNALS),
+    Fault("runtime/observation/rows.py", "np.abs(qd[instants].T) >= per_joint", "np.abs(qd[instants]).max(axis=1) >= per_joint", "low speed judged by the fastest joint", ("numeric/test_observation.py",)),
+    Fault("runtime/observation/rows.py", 'record.t, t1, side="right"', 'record.t, t1, side="left"', "the last sample of a window is lost", ("numeric/test_observation.py",)),
+    Fault("runtime/observation/observation.py", "median_filtered(tau, selection.signals.median)[selection.samples]", "tau[selection.samples]", "torques without their median filter", ("numeric/test_observation.py", "numeric/test_cestac.py")),
+    Fault("runtime/observation/qr_factor.py", "R=joint.R * w)", "R=joint.R * w**2)", "weights of the joints squared", ESTIMATES),
+    Fault("runtime/observation/system.py", "start = sum(self.rows[:j])", "start = sum(self.rows[: j + 1]) - self.rows[0]", "rows of a joint looked for at another place", ("numeric/test_observation.py", *ESTIMATES)),
+    # model: units and drives
+    Fault("runtime/model/drives.py", "* self.torque_constant) @ self._matrix", "/ self.torque_constant) @ self._matrix", "divided by torque constants", ("numeric/test_drives.py",)),
+    Fault("runtime/model/drives.py", "self._checked(qm).T).T + self.offset", "self._checked(qm).T).T - self.offset", "offset of the joints with the wrong sign", ("numeric/test_drives.py",)),
+    # estimators
+    Fault("runtime/estimators/linear.py", "freedom = system.weighted.rows - fit.rank", "freedom = system.weighted.rows", "degrees of freedom of sigma_rho, eq. (9)", ESTIMATES),
+    Fault("runtime/estimators/linear.py", "else sigma_rho**2)", "else sigma_rho)", "covariance of eq. (10) by the deviation in place of the variance", ESTIMATES),
+    Fault("runtime/estimators/wls.py", "weighted = raw.weighted(1 / scales)\n    return System", "weighted = raw.weighted(scales)\n    return System", "noisy joints weigh more", ("numeric/test_estimators.py",)),
+    Fault("runtime/estimators/irls.py", "(1 - (u / tuning) ** 2) ** 2, 0.0)", "1 - (u / tuning) ** 2, 0.0)", "weight function of Tukey without its square", ("numeric/test_irls.py",)),
+    Fault("runtime/estimators/block_covariance.py", "(s[others] / (1 - share[others]))", "s[others]", "leverage of a block left out of its deletion", ("numeric/test_estimators.py", "numeric/test_trust.py")),
+    Fault("runtime/estimators/essential.py", "np.argmax(relative)", "np.argmin(relative)", "the best known parameter is removed first", ("numeric/test_essential.py",)),
+    Fault("runtime/estimators/solution.py", "T = solve_triangular(factor.R11, np.eye(b))", "T = solve_triangular(factor.R11, np.eye(b)).T", "the inverse of R transposed: covariances of other parameters", ESTIMATES),
+)  # fmt: skip
+
+
+def caught_by(fault: Fault, copy: Path) -> str:
+    """The first test that fails with the fault in the copy; empty where all pass."""
+    path = copy / fault.file
+    right = path.read_text(encoding="utf-8")
+    if right.count(fault.old) != 1:
+        return f"? the text stands there {right.count(fault.old)} times"
+    path.write_text(right.replace(fault.old, fault.new), encoding="utf-8")
+    forget(path)
+    try:
+        environment = {**os.environ, "PYTHONPATH": str(copy), "SYMGEN_CACHE": str(copy / "cache"), "MPLBACKEND": "Agg"}
+        tests = [str(Path("tests") / name) for name in fault.tests]
+        command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-p", "no:cacheprovider", *tests]
+        done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, timeout=600, check=False)
+    finally:
+        path.write_text(right, encoding="utf-8")
+        forget(path)
+    found = re.search(r"^(?:FAILED|ERROR) (?:tests/)?(\S+)", done.stdout, re.MULTILINE)
+    return found[1] if found else "" if done.returncode == 0 else f"? pytest ended with {done.returncode}: {done.stdout[-300:]}"
+
+
+def forget(path: Path) -> None:
+    """Removes compiled files of a module, which are told apart by second and size alone."""
+    for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
+        compiled.unlink()
+
+
+def main() -> None:
+    numbers = [int(n) for n in sys.argv[1:]] or range(1, len(FAULTS) + 1)
+    missed = 0
+    print("| | fault | in | caught by |\n|---|---|---|---|", flush=True)
+    with tempfile.TemporaryDirectory(prefix="mutations-") as folder:
+        copy = Path(folder) / "checkout"
+        for name in COPIED:
+            source = ROOT / name
+            shutil.copytree(source, copy / name, ignore=shutil.ignore_patterns("__pycache__")) if source.is_dir() else shutil.copy(
+                source, copy / name
+            )
+        if not os.environ.get("SYMGEN_DATA") and (ROOT.parent / "shared" / "data").is_dir():
+            os.environ["SYMGEN_DATA"] = str(ROOT.parent / "shared" / "data")
+        for number in numbers:
+            fault = FAULTS[number - 1]
+            test = caught_by(fault, copy)
+            missed += not test or test.startswith("?")
+            print(
+                f"| {number} | {fault.meaning} | `{fault.file}` | {f'`{test}`' if test and test[0] != '?' else f'**none** {test}'} |",
+                flush=True,
+            )
+    if missed:
+        sys.exit(f"{missed} faults not caught")
+
+
+if __name__ == "__main__":
+    main()
