@@ -143,10 +143,10 @@ class _Shape:
 
     def of_binop(self, node: ast.BinOp) -> None:
         exponent = node.right.operand if isinstance(node.right, ast.UnaryOp) else node.right
-        written = isinstance(exponent, ast.Constant) and isinstance(exponent.value, int) and exponent.value <= MOST_POWER
+        power = exponent.value if isinstance(exponent, ast.Constant) and isinstance(exponent.value, int) else MOST_POWER + 1
         base = node.left.value if isinstance(node.left, ast.Constant) else 0.0
-        short = isinstance(base, float) or (type(base) is int and written and len(str(base)) * exponent.value <= MOST_DIGITS)
-        if isinstance(node.op, ast.Pow) and not (written and short):
+        short = isinstance(base, float) or (type(base) is int and len(str(base)) * power <= MOST_DIGITS)
+        if isinstance(node.op, ast.Pow) and not (power <= MOST_POWER and short):
             self.refuse(node, f"a power that emitted models do not take; their exponents are numbers up to {MOST_POWER}")
 
     def of_name(self, node: ast.Name) -> None:
