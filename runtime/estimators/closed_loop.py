@@ -1,17 +1,16 @@
 """The closed loop in which a record was made, run again with other parameters: what IV, DIDIM and CLOE compare the record with.
 
     loop = closed_loop(model, records, study, simulator)
-    observation = loop.measured()                Y = W X + rho, to which the loop stays attached
-    runs = loop.run(X, g)                 one simulation per record, exact states, no noise, no steps
-    loop.instruments(runs, observation)          Z = F_p[W(q_s, ...)], q_s through the filters of the record                   IDIM-IV
-    loop.motion(runs, observation)               Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the decimation alone       DIDIM
+    observation = loop.measured()             Y = W X + rho, to which the loop stays attached
+    runs = loop.run(X, g)                     one simulation per record, exact states, no noise, no steps
+    loop.instruments(runs, observation)       Z = F_p[W(q_s, ...)], q_s through the filters of the record                   IDIM-IV
+    loop.motion(runs, observation)            Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the decimation alone       DIDIM
 
 g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies all that stands between position error and torque: the bandwidth
 of the simulated loop stays that of the real one while X^k is far from the truth. Rows are chosen by the velocity of the reference, never by that
 of the measured positions: a choice that depends on noise biases every method. Slow rows of joint j (`rows.low_speed`) are those where a dry friction
 that acts on it, coupled ones of a wrist included, slips slower: at rest its torque is anything between -FS and FS, not W X, and the decimation smears
-that into the rows `around` (a noise-free record of the TX40 with stops: Ia5 9 % off; rows within 0.1 s left out: 0.1 %). Instants with the torque at
-its limit are left out.
+that into the rows `around`. Instants with the torque at its limit are left out.
 
 Where the reference is not known (`reference: measured`), the measured motion through the filters stands for it: then the instruments carry the
 noise of the same run, and DIDIM is output error about itself. The Estimate says so.
@@ -46,7 +45,7 @@ ASSUMED = (
 )
 
 
-class Run(Protocol):
+class SimulatedRun(Protocol):
     """What is used of a simulation: arrays of shape (N, n) at the recorded ticks."""
 
     @property
@@ -66,17 +65,17 @@ class Run(Protocol):
         """Torque of the drives."""
 
 
-class Simulator(Protocol):
+class LoopSimulator(Protocol):
     """What is used of `runtime.motion.simulation.Simulator`."""
 
     controller: Controller
     law: Any
     friction: Any
 
-    def run(self, X: Array, reference: Reference, *, g: Array | float, start: Array, ideal: bool) -> Run:
+    def run(self, X: Array, reference: Reference, *, g: Array | float, start: Array, ideal: bool) -> SimulatedRun:
         """One run; raises InputError where it cannot be made."""
 
-    def sensitivity(self, X: Array, reference: Reference, *, start: Array) -> tuple[Run, Any]:
+    def sensitivity(self, X: Array, reference: Reference, *, start: Array) -> tuple[SimulatedRun, Any]:
         """An ideal run, and its derivatives by X, arrays q and tau of shape (N, n, b)."""
 
 
@@ -96,11 +95,11 @@ class ClosedLoop:
 
     model: GeneratedModel
     study: Study
-    simulator: Simulator
+    simulator: LoopSimulator
     parts: tuple[LoopPart, ...]
     assumption: str = ""
 
-    def run(self, X: Array, g: Array | float = 1.0) -> list[Run]:
+    def run(self, X: Array, g: Array | float = 1.0) -> list[SimulatedRun]:
         """One simulation per record with all base parameters X (b,), from the measured position at its start, at rest."""
         return [self.simulator.run(X, part.reference, g=g, start=part.record.q[0], ideal=True) for part in self.parts]
 
@@ -109,17 +108,17 @@ class ClosedLoop:
         observation = self._observed([filtered_states(p.record.q, p.record.rate, p.selection.signals) for p in self.parts])
         return replace(observation, closed_loop=LoopRows(self, np.arange(len(observation.Y))))
 
-    def instruments(self, runs: Sequence[Run], observation: Observation) -> Observation:
+    def instruments(self, runs: Sequence[SimulatedRun], observation: Observation) -> Observation:
         """The rows and columns of `observation` with Z of the simulated positions, through the filters of the record, in place of W."""
         pairs = zip(runs, self.parts, strict=True)
         return self._like(observation, [filtered_states(run.q[: len(p.record)], p.record.rate, p.selection.signals) for run, p in pairs])
 
-    def motion(self, runs: Sequence[Run], observation: Observation) -> Observation:
+    def motion(self, runs: Sequence[SimulatedRun], observation: Observation) -> Observation:
         """The rows and columns of `observation` with Z of the exact simulated states in place of W."""
         sizes = [len(part.record) for part in self.parts]
         return self._like(observation, [States(run.q[:N], run.qd[:N], run.qdd[:N]) for run, N in zip(runs, sizes, strict=True)])
 
-    def sensitivity(self, X: Array) -> list[tuple[Run, Any]]:
+    def sensitivity(self, X: Array) -> list[tuple[SimulatedRun, Any]]:
         """One simulation per record, with its derivatives by X."""
         return [self.simulator.sensitivity(X, part.reference, start=part.record.q[0]) for part in self.parts]
 
@@ -160,7 +159,7 @@ def closed_loop(
     model: GeneratedModel,
     records: Sequence[Record],
     study: Study,
-    simulator: Simulator,
+    simulator: LoopSimulator,
     *,
     reference: str = "known",
     around: float = 0.0,
@@ -238,7 +237,7 @@ def slowest(speed: Array, samples: int) -> Array:
     return speed if samples == 0 else np.asarray(minimum_filter1d(speed, 2 * samples + 1, axis=0, mode="nearest"))
 
 
-def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:
+def _usable(simulator: LoopSimulator, record: Record, keep: Array | None) -> Array | None:
     """`keep`, and the samples whose torque is not at its limit."""
     bound = np.broadcast_to(np.asarray(simulator.law.saturation, dtype=float), (record.n,))
     if not np.isfinite(bound).any():

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from runtime.estimators import wls
-from runtime.estimators.closed_loop import Run, loop_of
+from runtime.estimators.closed_loop import SimulatedRun, loop_of
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.fixed_point import Array, Step, iterate, options_of, outcome_of, trail_of
 from runtime.estimators.linear import System, assemble, columns_asked, standard_deviations
@@ -36,7 +36,7 @@ def didim(
     loop, options = loop_of(observation, "didim"), options_of(settings)
     observation = observation.columns(columns_asked(observation, settings))
 
-    def update(runs: Sequence[Run], X: Array) -> Step:
+    def update(runs: Sequence[SimulatedRun], X: Array) -> Step:
         system = wls.system(loop.motion(runs, observation), EstimateSettings(method="wls"))
         fit = system.solve()
         _, C = standard_deviations(system, fit)

@@ -30,7 +30,19 @@ THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
 
 @dataclass(frozen=True)
 class Removal:
-    """One step: `name` had the largest %sigma (in %); without it sigma_rho is `ratio` times the first one; `removed` tells if it went."""
+    """One step of the trail.
+
+    Attributes
+    ----------
+    name : str
+        Parameter of the largest %sigma.
+    relative_sigma : float, %
+        Its %sigma.
+    ratio : float
+        sigma_rho without it over the first sigma_rho.
+    removed : bool
+        Whether it was removed.
+    """
 
     name: str
     relative_sigma: float
@@ -40,11 +52,24 @@ class Removal:
 
 @dataclass(frozen=True, eq=False)
 class Essential:
-    """The essential parameters and how they were found.
+    """The essential parameters, and the trail that leads to them.
 
-    names : kept, in column order.   estimate : fit with these alone.   all_parameters : the first fit.
-    trail : one Removal per step, the last one being the first refused (or the last parameter); further : the next steps, up to the largest threshold.
-    counts : number of parameters kept, by threshold.
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters kept, in column order.
+    estimate : Estimate
+        Fit with these alone.
+    all_parameters : Estimate
+        The first fit.
+    trail : tuple of Removal
+        The steps; the last one is the first refused, or the last parameter.
+    threshold : float
+        Largest ratio of sigma_rho to its first value.
+    counts : mapping of float to int
+        Number of parameters kept, by threshold.
+    further : tuple of Removal
+        The next steps, up to the largest threshold.
     """
 
     names: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What every estimator returns: parameters with an honest statement of how far to trust them.
+"""What every estimator returns: parameters, their deviations and the quality of the fit.
 
 Equation numbers are those of the chapter (Experimental identification of the inverse dynamic model: minimal encoder resolution):
 

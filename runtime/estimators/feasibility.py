@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.semidefinite import FURTHEST, Distance, Optimum, Prior, Rows, closest, margin, solutions
+from runtime.estimators.semidefinite import FURTHEST, Distance, LinearBounds, Optimum, Prior, closest, margin, solutions
 from runtime.model.inertia import INERTIAL, PhysicalModel
 from runtime.settings.schema import Positive, Real, Settings, Text
 
@@ -42,7 +42,7 @@ class Ellipsoid(Settings):
     axes: tuple[Positive, Positive, Positive]
 
 
-class Limits(Settings):
+class RobotLimits(Settings):
     """Knowledge about the standard parameters of a robot.
 
     Attributes
@@ -85,7 +85,7 @@ class Feasibility:
         return f"NOT physically feasible: no positive mass density and friction gives these parameters; in the way: {named}"
 
 
-def feasibility(physical: PhysicalModel, names: Sequence[str], X: Array, limits: Limits | None = None) -> Feasibility:
+def feasibility(physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None) -> Feasibility:
     """Whether base parameters X, shape (len(names),), are those of a physical robot within the limits."""
     rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, scales(physical))
     first = margin(physical.conditions, rows, space)
@@ -100,7 +100,7 @@ def feasibility(physical: PhysicalModel, names: Sequence[str], X: Array, limits:
     return Feasibility(first.margin, not blocking, tuple(blocking), first.chi)
 
 
-def standard_parameters(physical: PhysicalModel, names: Sequence[str], X: Array, limits: Limits | None = None) -> Array:
+def standard_parameters(physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None) -> Array:
     """chi, shape (p,), with K chi = X to rounding and every condition fulfilled; raises InputError where X is infeasible.
 
     Of all such chi the one nearest to the values of the robot file, or to zero where it has none, in units of their size.
@@ -111,7 +111,7 @@ def standard_parameters(physical: PhysicalModel, names: Sequence[str], X: Array,
     return nearest_standard(physical, names, X, answer.chi, limits)
 
 
-def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, start: Array, limits: Limits | None = None) -> Array:
+def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, start: Array, limits: RobotLimits | None = None) -> Array:
     """The chi of `standard_parameters` where one that fulfils the conditions, `start`, is known."""
     scale = scales(physical)
     space, rows = solutions(physical.rows(names), X, scale), limit_rows(physical, limits)
@@ -122,9 +122,9 @@ def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, st
     return nearest.chi if kept else start
 
 
-def limit_rows(physical: PhysicalModel, limits: Limits | None) -> Rows:
+def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBounds:
     """The limits as rows lower <= A chi <= upper."""
-    limits = limits or Limits()
+    limits = limits or RobotLimits()
     entries: list[tuple[str, dict[int, float], float, float]] = []
     for name, (low, high) in limits.bounds.items():
         if name not in physical.standard:
@@ -149,7 +149,7 @@ def limit_rows(physical: PhysicalModel, limits: Limits | None) -> Rows:
     for row, (_, weights_of, _, _) in enumerate(entries):
         A[row, list(weights_of)] = list(weights_of.values())
     lower, upper = (np.array([entry[k] for entry in entries], dtype=float) for k in (2, 3))
-    return Rows(tuple(entry[0] for entry in entries), A, lower, upper)
+    return LinearBounds(tuple(entry[0] for entry in entries), A, lower, upper)
 
 
 def scales(physical: PhysicalModel) -> Array:
@@ -181,7 +181,7 @@ def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | No
     return Prior(kind, chi0, scales(physical), numbers, weight)
 
 
-def unsolved(status: str, rows: Rows, attempt: Callable[[Rows], Optimum]) -> str:
+def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], Optimum]) -> str:
     """What happened, the likely cause, what to try. attempt : the same problem with other rows; each limit is released in turn."""
     helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
     if helps:

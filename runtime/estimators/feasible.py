@@ -7,7 +7,7 @@ W is factored once and b rows enter the semidefinite program (`runtime.estimator
 parameters are fitted, essential or not: a condition ties every parameter of a link. With the columns of some parameters alone, the others
 are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls. Where least squares is feasible, it is the solution.
 
-options (all of `runtime.estimators.feasibility.Limits` too):
+options (all of `runtime.estimators.feasibility.RobotLimits` too):
     margin     smallest eigenvalue of every condition, SI; 1e-6
     prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from the values of the robot file
     weight     of D, a number; "auto": the largest, to half a decade, that raises the residual norm by at most 1 %; "held-out": that by which
@@ -35,9 +35,9 @@ from runtime.errors import InputError
 from runtime.estimators import wls
 from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.feasibility import Limits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
+from runtime.estimators.feasibility import RobotLimits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
 from runtime.estimators.linear import System, assemble
-from runtime.estimators.semidefinite import Distance, Optimum, Rows, closest, everything
+from runtime.estimators.semidefinite import Distance, LinearBounds, Optimum, closest, everything
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import PhysicalModel, physical_model
 from runtime.observation.qr_factor import Array, Factor, factor
@@ -50,8 +50,8 @@ WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)
 ACTIVE = 2.0  # a condition within this factor of the margin is active
 
 
-class FeasibleOptions(Limits):
-    """estimate.options of method feasible; those of `Limits` too.
+class FeasibleOptions(RobotLimits):
+    """estimate.options of method feasible; those of `RobotLimits` too.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ def fitted(R: Array, z: Array, physical: PhysicalModel, options: FeasibleOptions
     rows, space = limit_rows(physical, options), everything(scales(physical))
     pull = pulled(physical, options.prior, weight)
 
-    def attempt(within: Rows) -> Optimum:
+    def attempt(within: LinearBounds) -> Optimum:
         return closest(R, z, physical.conditions, within, space, least=options.margin, pull=pull)
 
     optimum = attempt(rows)

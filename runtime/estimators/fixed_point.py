@@ -18,7 +18,7 @@ import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators import ols
-from runtime.estimators.closed_loop import ClosedLoop, Run
+from runtime.estimators.closed_loop import ClosedLoop, SimulatedRun
 from runtime.estimators.estimate import Status
 from runtime.observation.system import Observation
 from runtime.settings.schema import Count, Positive, Real, Settings, structure
@@ -126,7 +126,7 @@ def initial(loop: ClosedLoop, observation: Observation, which: str | Mapping[str
 
 
 def iterate(
-    loop: ClosedLoop, observation: Observation, options: FixedPointOptions, update: Callable[[Sequence[Run], Array], Step]
+    loop: ClosedLoop, observation: Observation, options: FixedPointOptions, update: Callable[[Sequence[SimulatedRun], Array], Step]
 ) -> Fixed:
     """The fixed point of X -> update(simulation with X, X), X of the columns of `observation`."""
     names, every = observation.names, loop.model.BASE_PARAMETERS
@@ -171,7 +171,7 @@ def iterate(
 
 def _simulated(
     loop: ClosedLoop, names: Sequence[str], every: Sequence[str], X: Array, before: Array | None, J: Array | None
-) -> tuple[Array, Array, Sequence[Run], str]:
+) -> tuple[Array, Array, Sequence[SimulatedRun], str]:
     """X that can be simulated, on the way from the last one that could; g, the runs, and why none could be made."""
     reason = ""
     for _ in range(HALVINGS + 1):

@@ -26,7 +26,7 @@ from scipy.stats import chi2
 from runtime.errors import InputError
 from runtime.estimators import ols, wls
 from runtime.estimators.block_covariance import deletions
-from runtime.estimators.closed_loop import Run, loop_of
+from runtime.estimators.closed_loop import SimulatedRun, loop_of
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.fixed_point import Array, Step, iterate, options_of, outcome_of, trail_of
 from runtime.estimators.linear import assemble, columns_asked, outcome
@@ -59,7 +59,7 @@ def iv(
     if first.rank < len(names):
         return assemble(replace(base, settings=settings), first, model=model, provenance=provenance)
 
-    def update(runs: Sequence[Run], X: Array) -> Step:
+    def update(runs: Sequence[SimulatedRun], X: Array) -> Step:
         Z = loop.instruments(runs, observation).W
         s = wls.floored(base.raw, wls.common_scales(base.raw, X, len(X)))
         solution = _solved(observation, Z, s)

@@ -31,11 +31,28 @@ OPTIONS = ("rank_tolerance", "block")
 class System:
     """The factored rows of one observation.
 
-    observation : the rows, all columns.
-    raw : factor of [W Y]; weighted : factor of the system that is solved. Both hold the columns still in play.
-    scales : s_j of each joint, by which its rows are divided; 1 without weights.
-    whitener : ndarray, shape (n, n), that multiplies the n rows of one instant instead, or None.
-    known_variance : C = (W'W)^-1 of the weighted system, as its rows have variance 1; else C = sigma_rho^2 (W'W)^-1.
+    Attributes
+    ----------
+    observation : Observation
+        The rows, all columns.
+    settings : EstimateSettings
+        Method, weights, columns, options.
+    raw : Factor
+        Factor of [W Y], of the columns still in play.
+    weighted : Factor
+        Factor of the system that is solved, of the same columns.
+    scales : tuple of float, N m or N
+        s_j of each joint, by which its rows are divided; 1 without weights.
+    whitener : ndarray, shape (n, n), or None
+        Multiplies the n rows of one instant in place of the scales.
+    known_variance : bool
+        The rows of the weighted system have variance 1: C = (W'W)^-1; else C = sigma_rho^2 (W'W)^-1.
+    iterations : int
+        Passes that found the weights.
+    status, message : str
+        As in an Estimate.
+    options : mapping
+        Checked options of the method.
     """
 
     observation: Observation

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from runtime.errors import SettingsError
 from runtime.estimators import cloe, didim, feasible, irls, iv, ols, tls, wls
-from runtime.estimators.closed_loop import Simulator, closed_loop
+from runtime.estimators.closed_loop import LoopSimulator, closed_loop
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import System, assemble
 from runtime.model.generated import GeneratedModel
@@ -84,7 +84,7 @@ def estimate(
     records: Record | Stream | Sequence[Record | Stream] | Observation,
     study: Study | None = None,
     *,
-    simulator: Simulator | None = None,
+    simulator: LoopSimulator | None = None,
 ) -> Estimate:
     """All parameters of records, or of their Observation, by the method of the study.
 
@@ -96,7 +96,7 @@ def estimate(
         Joint side, SI.
     study : Study, optional
         Settings; default: Study().
-    simulator : Simulator, optional
+    simulator : LoopSimulator, optional
         Closed loop of iv, didim and cloe; default: that of study.controller.
 
     Returns
@@ -180,7 +180,7 @@ def observed(
     study: Study,
     *,
     windows: Sequence[Window] | None = None,
-    simulator: Simulator | None = None,
+    simulator: LoopSimulator | None = None,
 ) -> Observation:
     """The Observation that the method of the study needs: with errors of its columns for tls, with the closed loop for those that simulate it.
 
@@ -194,7 +194,7 @@ def observed(
         Settings.
     windows : sequence of (float or None, float or None), s, optional
         As in `runtime.observation.observation.observe`.
-    simulator : Simulator, optional
+    simulator : LoopSimulator, optional
         Closed loop that made the records.
     """
     settings, several = study.estimate, list(records) if isinstance(records, Sequence) else [records]
@@ -212,10 +212,10 @@ def observed(
     return observe(model, several, study, windows=windows, needed_by=needed_by)
 
 
-def simulator_of(model: GeneratedModel, study: Study) -> Simulator | None:
+def simulator_of(model: GeneratedModel, study: Study) -> LoopSimulator | None:
     """The closed loop of study.controller where the method of the study simulates one; else None."""
     if study.controller is None or not method_of(study.estimate).closed_loop:
         return None
-    from runtime.motion.simulation import Simulator as ControlledArm  # CasADi, for these methods alone
+    from runtime.motion.simulation import Simulator  # CasADi, for these methods alone
 
-    return ControlledArm(model, study.controller)
+    return Simulator(model, study.controller)

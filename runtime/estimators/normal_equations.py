@@ -51,7 +51,7 @@ class LeastSquares:
 
 
 @dataclass(frozen=True, eq=False)
-class Normal:
+class JointEquations:
     """Normal equations of [W Y] by joint.
 
     columns : C_j, by joint.   grams : Gram matrix of [W_j[:, C_j] Y_j], shape (|C_j| + 1, |C_j| + 1), by joint.   b : number of columns of W.
@@ -110,13 +110,13 @@ class Cholesky:
         return np.asarray(self.D * cho_solve((self.L, True), self.D * g))
 
 
-def normal(blocks: Iterable[Block], columns: Sequence[Array], b: int) -> Normal:
+def normal(blocks: Iterable[Block], columns: Sequence[Array], b: int) -> JointEquations:
     """Normal equations of all blocks."""
     grams = [np.zeros((len(C) + 1, len(C) + 1)) for C in columns]
     for block in blocks:
         for gram, rows in zip(grams, block, strict=True):
             gram += rows @ rows.T
-    return Normal(tuple(columns), tuple(grams), b)
+    return JointEquations(tuple(columns), tuple(grams), b)
 
 
 def least_squares(
@@ -154,7 +154,7 @@ def _by_triangular_factor(blocks: Callable[[], Iterable[Block]], columns: Sequen
     return LeastSquares(fit.X, np.array([joint.residual_norm(fit.X) for joint in factor.joints]), fit.cond_unit, "triangular factor")
 
 
-def _gradient(blocks: Iterable[Block], equations: Normal, X: Array) -> tuple[list[Array], Array]:
+def _gradient(blocks: Iterable[Block], equations: JointEquations, X: Array) -> tuple[list[Array], Array]:
     """W_j'(Y_j - W_j X) and ||Y_j - W_j X||^2 by joint, from the rows themselves."""
     weights = [np.append(-X[C], 1.0) for C in equations.columns]
     g, squares = [np.zeros(len(C)) for C in equations.columns], np.zeros(len(weights))
@@ -166,13 +166,13 @@ def _gradient(blocks: Iterable[Block], equations: Normal, X: Array) -> tuple[lis
     return g, squares
 
 
-def _change(equations: Normal, g: Sequence[Array], step: Array) -> Array:
+def _change(equations: JointEquations, g: Sequence[Array], step: Array) -> Array:
     """||r_j - W_j step||^2 - ||r_j||^2 = step'A_j step - 2 step'g_j by joint: small beside ||r_j||^2, so nothing cancels."""
     parts = zip(equations.columns, equations.grams, g, strict=True)
     return np.array([step[C] @ gram[:-1, :-1] @ step[C] - 2 * step[C] @ g_j for C, gram, g_j in parts])
 
 
-def _squares(equations: Normal, X: Array) -> Array:
+def _squares(equations: JointEquations, X: Array) -> Array:
     """||Y_j - W_j X||^2 from the Gram matrices: without a refinement, exact to eps ||Y_j||^2 only."""
     weights = [np.append(-X[C], 1.0) for C in equations.columns]
     return np.array([w @ gram @ w for w, gram in zip(weights, equations.grams, strict=True)])

@@ -39,7 +39,7 @@ LARGEST = 1e4  # largest unknown, in units of its size: the problem of `margin` 
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class LinearBounds:
     """lower <= A chi <= upper, one name per row; infinite where there is no bound."""
 
     names: tuple[str, ...]
@@ -47,10 +47,10 @@ class Rows:
     lower: Array
     upper: Array
 
-    def without(self, name: str) -> Rows:
+    def without(self, name: str) -> LinearBounds:
         """The rows of other names."""
         kept = [k for k, own in enumerate(self.names) if own != name]
-        return Rows(tuple(self.names[k] for k in kept), self.A[kept], self.lower[kept], self.upper[kept])
+        return LinearBounds(tuple(self.names[k] for k in kept), self.A[kept], self.lower[kept], self.upper[kept])
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +71,12 @@ def solutions(K: Array, X: Array, scale: Array) -> Space:
     return Space(scale * np.linalg.lstsq(K * scale, X, rcond=None)[0], scale[:, None] * null_space(K * scale))
 
 
-def within(space: Space, rows: Rows) -> tuple[Space, Rows]:
+def within(space: Space, rows: LinearBounds) -> tuple[Space, LinearBounds]:
     """`space` with the rows that are equations fulfilled (nearest to that where they contradict it), and the other rows."""
     equal = rows.lower == rows.upper
-    others = Rows(tuple(n for n, e in zip(rows.names, equal, strict=True) if not e), *(x[~equal] for x in (rows.A, rows.lower, rows.upper)))
+    others = LinearBounds(
+        tuple(n for n, e in zip(rows.names, equal, strict=True) if not e), *(x[~equal] for x in (rows.A, rows.lower, rows.upper))
+    )
     if not equal.any():
         return space, others
     A = rows.A[equal]
@@ -164,7 +166,7 @@ class Program:
             self.constraints.append((clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1), A, b - least * one))
             self.multipliers[c.name] = slice(start, start := start + len(one))
 
-    def rows_hold(self, rows: Rows) -> None:
+    def rows_hold(self, rows: LinearBounds) -> None:
         """lower <= A chi <= upper."""
         A, b = self.of_chi(rows.A)
         for sign, bound in ((1.0, rows.lower), (-1.0, rows.upper)):
@@ -223,7 +225,7 @@ def closest(
     R: Array,
     z: Array,
     conditions: Sequence[Condition],
-    rows: Rows,
+    rows: LinearBounds,
     space: Space,
     *,
     least: float,
@@ -264,7 +266,7 @@ def closest(
     return Optimum(status, space.origin + space.basis @ x[: program.m], float("nan"), duals)
 
 
-def margin(conditions: Sequence[Condition], rows: Rows, space: Space) -> Optimum:
+def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:
     """The largest t with every P - t 1 positive semidefinite: `margin`; negative where no physical robot is in `space`."""
     space, rows = within(space, rows)
     program = Program(space, 1)

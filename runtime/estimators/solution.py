@@ -27,12 +27,20 @@ PARTICIPATION = 1e-6
 class Solution:
     """Least-squares solution of one triangular factor.
 
-    X : ndarray, shape (b,).
-    T : ndarray, shape (b, rank), T T' = (W'W)^-1 (on the determined directions when rank < b).
-    residual_norm : ||Y - W X|| of the factored system (weighted if its rows are).
-    rank : numerical rank of W with unit columns.
-    cond, cond_unit : condition number of W, and of W with unit columns.
-    groups : names that this record cannot tell apart; a group of one has no effect on the rows.
+    Attributes
+    ----------
+    X : ndarray, shape (b,), SI
+        Parameters.
+    T : ndarray, shape (b, rank)
+        T T' = (W'W)^-1, on the determined directions when rank < b.
+    residual_norm : float
+        ||Y - W X|| of the factored system, weighted if its rows are.
+    rank : int
+        Numerical rank of W with unit columns.
+    cond, cond_unit : float
+        Condition number of W, and of W with unit columns.
+    groups : tuple of tuples of str
+        Names that this record cannot tell apart; a group of one has no effect on the rows.
     """
 
     X: Array

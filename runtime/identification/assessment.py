@@ -7,12 +7,11 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from runtime.errors import InputError
-from runtime.estimators.closed_loop import Simulator
+from runtime.estimators.closed_loop import LoopSimulator
 from runtime.identification.friction import friction_curves
 from runtime.identification.identification import feasibility_of, identify
 from runtime.identification.result import Identification
 from runtime.model.generated import GeneratedModel
-from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.records.stream import Stream
 from runtime.resolution.advisor import advise
@@ -28,7 +27,7 @@ def assess(
     study: Study | None = None,
     *,
     encoder: Sequence[float] = (),
-    simulator: Simulator | None = None,
+    simulator: LoopSimulator | None = None,
     provenance: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda part: None,
 ) -> Identification:
@@ -68,9 +67,9 @@ def assess(
     if len(whole) < len(result.records):
         missing.append("friction and encoder resolution: they need whole records; set stream: off")
         return replace(result, missing=tuple(missing))
-    study, names, sources = result.study, result.essential.names, origin(whole)
+    study, names = result.study, result.essential.names
     columns = names if study.cestac.columns == "essential" else None
     curves = attempt("friction", lambda: friction_curves(model, whole, study, result.estimate))
-    advice = attempt("resolution advice", lambda: advise(model, whole, study, columns=names, asked=tuple(encoder), provenance=sources))
-    resolution = attempt("resolution study", lambda: cestac(model, whole, study, columns=columns, provenance=sources))
+    advice = attempt("resolution advice", lambda: advise(model, whole, study, columns=names, asked=tuple(encoder)))
+    resolution = attempt("resolution study", lambda: cestac(model, whole, study, columns=columns))
     return replace(result, friction=curves or (), advice=advice, resolution=resolution, missing=tuple(missing))

@@ -13,7 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from runtime.errors import InputError
-from runtime.estimators.closed_loop import Simulator
+from runtime.estimators.closed_loop import LoopSimulator
 from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import LINEAR, estimate_of, linear_companion, simulator_of
 from runtime.estimators.methods import observed as method_observation
@@ -44,7 +44,7 @@ def identify(
     study: Study | None = None,
     *,
     further: Sequence[Record | Stream] | None = None,
-    simulator: Simulator | None = None,
+    simulator: LoopSimulator | None = None,
     physical: bool = False,
     friction: bool = False,
     provenance: Mapping[str, Any] | None = None,
@@ -61,7 +61,7 @@ def identify(
         Settings; default: Study().
     further : sequence of Record or Stream, optional
         Records that the parameters predict; default: those of study.validate.record, read from their files.
-    simulator : Simulator, optional
+    simulator : LoopSimulator, optional
         The closed loop, which iv, didim and cloe need; default: that of study.controller, with the CasADi module that lies with `model`.
     physical : bool
         Whether a physical robot can have the parameters.

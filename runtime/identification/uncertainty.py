@@ -1,6 +1,6 @@
-"""How far to trust an identification: what eqs. (9)-(11) and the threshold 1.04 take for granted, checked on the record.
+"""What eqs. (9)-(11) and the threshold 1.04 take for granted, checked on the record.
 
-    scatter       blocks of time drawn again with replacement, least squares each time: deviations without the assumption of independent residuals,
+    bootstrap     blocks of time drawn again with replacement, least squares each time: deviations without the assumption of independent residuals,
                   beside sigma (10) and the corrected one
     whiteness     are the residuals of every joint independent (`runtime.identification.residuals`)?
     F-test        does a parameter that was removed carry something? Removing q of b raises the squared residual norm S from S_0 to S_q:
@@ -9,7 +9,7 @@
 
 S_q = ratio^2 (r - b + q) S_0/(r - b), with the ratio of sigma_rho that the trail of `runtime.estimators.essential` holds.
 
-References: Kunsch (1989) for the blocks; Seber and Lee (2003), section 4.3, for F.
+References: Seber and Lee (2003), section 4.3, for F.
 """
 
 from __future__ import annotations
@@ -40,7 +40,25 @@ SEED = 1
 
 @dataclass(frozen=True, eq=False)
 class BlockBootstrap:
-    """Deviations of the essential parameters three ways, shape (b,) each: eq. (10), corrected for correlation, drawn again by blocks."""
+    """Deviations of the essential parameters three ways.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The b parameters.
+    sigma : ndarray, shape (b,), SI
+        Eq. (10).
+    corrected : ndarray, shape (b,), SI
+        Jackknife over blocks of time.
+    drawn : ndarray, shape (b,), SI
+        Blocks of time drawn again with replacement.
+    blocks : int
+        Number of blocks.
+    length : float, s
+        Length of a block.
+    runs, seed : int
+        Draws, and the seed of their random numbers.
+    """
 
     names: tuple[str, ...]
     sigma: Array
@@ -60,7 +78,21 @@ class BlockBootstrap:
 
 @dataclass(frozen=True)
 class FTest:
-    """One step of the trail. p : of all removals up to it; p_step : of this one against the step before; `significant`: p below 5 %."""
+    """One step of the trail, tested.
+
+    Attributes
+    ----------
+    name : str
+        Parameter removed.
+    ratio : float
+        sigma_rho over its first value.
+    F, p : float
+        Statistic and probability of all removals up to this one.
+    F_step, p_step : float
+        Those of this removal against the step before.
+    removed : bool
+        Whether the threshold allowed it.
+    """
 
     name: str
     ratio: float
@@ -72,13 +104,27 @@ class FTest:
 
     @property
     def significant(self) -> bool:
-        """What went so far carries something."""
+        """p below 5 %: the parameters removed so far carry something."""
         return self.p < SIGNIFICANT
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Checks of one identification. sets : by threshold, count and the names that differ from the set used ("-": removed besides, "+": kept besides)."""
+    """Checks of the essential parameters of one identification.
+
+    Attributes
+    ----------
+    bootstrap : BlockBootstrap
+        Deviations three ways.
+    whiteness : tuple of Whiteness
+        Residuals by joint.
+    f_tests : tuple of FTest
+        Steps of the trail.
+    sets : tuple of (float, int, tuple of str)
+        By threshold: count, and names that differ from the set used ("-": removed besides, "+": kept besides).
+    all_count : int
+        Number of all parameters.
+    """
 
     bootstrap: BlockBootstrap
     whiteness: tuple[Whiteness, ...]

@@ -37,7 +37,17 @@ PARTICIPATION = 0.3
 
 @dataclass(frozen=True, eq=False)
 class JointComparison:
-    """One joint: t in s, measured and predicted torque in N m (N), shape (N_j,) each; relative error in %."""
+    """Torques of one joint.
+
+    Attributes
+    ----------
+    joint : str
+        Label of the joint.
+    t : ndarray, shape (N_j,), s
+        Time of the rows.
+    measured, predicted : ndarray, shape (N_j,), N m or N
+        Y_j and W_j X.
+    """
 
     joint: str
     t: Array
@@ -92,7 +102,23 @@ def direct_comparison(observation: Observation, fit: Estimate) -> Comparison:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Error of one set of columns on one part: in % in total and per joint; `fitted` marks the part that gave the parameters."""
+    """Error of one set of columns on one part of the data.
+
+    Attributes
+    ----------
+    part : str
+        Label of the part.
+    columns : str
+        all or essential.
+    count : int
+        Number of columns.
+    fitted : bool
+        Whether this part gave the parameters.
+    relative_error : float, %
+        100 ||Y - W X|| / ||Y||.
+    per_joint : tuple of float, %
+        The same by joint.
+    """
 
     part: str
     columns: str
@@ -146,7 +172,20 @@ def cross_validation(
 ) -> CrossValidation:
     """Fit on one observation, predict others, with all columns and with the essential ones.
 
-    predict : observations by label; essential : names found before, on the whole record or on the fitted part.   model : for methods that need it.
+    Parameters
+    ----------
+    fit : Observation
+        Rows that give the parameters.
+    predict : mapping of str to Observation
+        Other rows, by label.
+    settings : EstimateSettings, optional
+        Method; default: ols.
+    essential : sequence of str, optional
+        Names of the essential parameters.
+    name : str
+        Label of `fit`.
+    model : GeneratedModel, optional
+        For methods that need it.
     """
     settings = point_estimate(settings or EstimateSettings())
     choices = {"all": settings.columns} | ({} if essential is None else {"essential": tuple(essential)})
@@ -192,7 +231,12 @@ class Pair:
 class Direction:
     """A combination of parameters that moves W X little.
 
-    ratio : s_i / s_1 of W with unit columns.   weights : entries of the singular vector (unit columns), largest first.
+    Attributes
+    ----------
+    ratio : float
+        s_i / s_1 of W with unit columns.
+    weights : mapping of str to float
+        Entries of the singular vector, largest first.
     """
 
     ratio: float

@@ -67,7 +67,7 @@ def median_filtered(x: Array, window: int) -> Array:
 
 
 def _inner(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
-    """The two middle ones of four values: their median with a fifth value is that of all five. A third of the time of a sort at every sample."""
+    """The two middle ones of four values: their median with a fifth value is that of all five."""
     return np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(np.maximum(a, b), np.maximum(c, d))
 
 

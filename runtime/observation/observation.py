@@ -28,7 +28,7 @@ from runtime.observation.by_blocks import layout, observed_blocks
 from runtime.observation.filters import States, decimated, filtered_states, median_filtered
 from runtime.observation.regressor_signals import decimated_columns, distinct_entries
 from runtime.observation.rows import Selection, select_rows
-from runtime.observation.segments import KeptRows, Segment, SegmentFactors, Window
+from runtime.observation.segments import HeldRows, Segment, SegmentFactors, Window
 from runtime.observation.system import (
     HELD,
     Observation,
@@ -187,7 +187,7 @@ def _observed_by_blocks(
     span = min(at.t0 for at in layouts), max(at.t1 for at in layouts)
     cuts = tuple(windows if windows is not None else study.validate.split or halves(*span))
     length = float(study.estimate.options.get("block") or default_block(rows, rate))
-    kept = KeptRows(columns, counts if held else np.array([at.shown for at in layouts]), len(names))
+    kept = HeldRows(columns, counts if held else np.array([at.shown for at in layouts]), len(names))
     segments: list[Segment] = []
     for number, (stream, at) in enumerate(zip(streams, layouts, strict=True)):
         factors = SegmentFactors(number, at.t0, length, cuts, columns)

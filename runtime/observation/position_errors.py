@@ -42,14 +42,14 @@ NODE = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Normal:
+class NormalEquations:
     """Normal equations by joint: G, shape (n, b, b), of W_j'W_j, and g, shape (n, b), of W_j'Y_j."""
 
     G: Array
     g: Array
 
-    def __add__(self, other: Normal) -> Normal:
-        return Normal(self.G + other.G, self.g + other.g)
+    def __add__(self, other: NormalEquations) -> NormalEquations:
+        return NormalEquations(self.G + other.G, self.g + other.g)
 
     def solve(self, weights: Array) -> Array:
         """X, shape (b,), with the rows of joint j multiplied by weights[j]; columns are scaled first."""
@@ -76,8 +76,8 @@ class Perturbation:
     along: Mapping[int, Array]
     band: Bandwidth
     root: Array
-    clean: Normal
-    smooth: tuple[Normal, ...]
+    clean: NormalEquations
+    smooth: tuple[NormalEquations, ...]
     errors: tuple[Array, ...]
     speeds: tuple[Array, ...]
     switches: tuple[Switch, ...]
@@ -85,16 +85,16 @@ class Perturbation:
     used: Array
     known: dict[tuple[int, int], Switched] = field(default_factory=dict)
 
-    def expected(self, variance: float, encoders: Sequence[int]) -> Normal:
+    def expected(self, variance: float, encoders: Sequence[int]) -> NormalEquations:
         """Expected normal equations with errors of that variance on the encoders named (from 0), the others exact."""
         normal = self.clean
         for i in encoders:
-            normal = normal + Normal(variance * self.smooth[i].G, variance * self.smooth[i].g)
+            normal = normal + NormalEquations(variance * self.smooth[i].G, variance * self.smooth[i].g)
         if not self.switches or variance == 0:
             return normal
         G, g = normal.G.copy(), normal.g.copy()
         self._add_switches(G, g, variance, encoders)
-        return Normal(G, g)
+        return NormalEquations(G, g)
 
     def _add_switches(self, G: Array, g: Array, variance: float, encoders: Sequence[int]) -> None:
         """Means, covariances with the smooth columns and with each other, variances of the columns that switch."""
@@ -237,7 +237,7 @@ def _smooth(
     root: Array,
     switching: Sequence[Switch],
     constants: Mapping[str, float],
-) -> tuple[tuple[Normal, ...], tuple[Array, ...], tuple[Array, ...]]:
+) -> tuple[tuple[NormalEquations, ...], tuple[Array, ...], tuple[Array, ...]]:
     """Per encoder: what errors of variance 1 add to the normal equations, E[dW'dW] of it, and the sensitivities to the speed."""
     kept = States(window.q[selection.kept], window.qd[selection.kept], window.qdd[selection.kept])
     columns = np.array([model.BASE_PARAMETERS.index(name) for name in observation.names])
@@ -264,7 +264,7 @@ def _smooth(
             second += (up - 2 * at_rest + down) / (2 * h**2)
         squares = _squares(selection, np.array(first), C, rigid)
         shifted = _shifted(observation, selection, band.gain * second, rigid)
-        smooth.append(Normal(squares + shifted.G, shifted.g))
+        smooth.append(NormalEquations(squares + shifted.G, shifted.g))
         errors.append(squares)
         speeds.append(np.where(rigid.T[:, :, None], first[1], 0.0).transpose(1, 0, 2) * selection.mask[:, None, :])
     return tuple(smooth), tuple(errors), tuple(speeds)
@@ -281,7 +281,7 @@ def _squares(selection: Selection, first: Array, C: Array, rigid: Array) -> Arra
     return G
 
 
-def _shifted(observation: Observation, selection: Selection, second: Array, rigid: Array) -> Normal:
+def _shifted(observation: Observation, selection: Selection, second: Array, rigid: Array) -> NormalEquations:
     """W'E[dW] + E[dW]'W and E[dW]'Y by joint; second = E[dW], shape (b, n, K)."""
     n, b = rigid.shape
     G, g = np.zeros((n, b, b)), np.zeros((n, b))
@@ -292,8 +292,8 @@ def _shifted(observation: Observation, selection: Selection, second: Array, rigi
         G[j][columns] += change
         G[j][:, columns] += change.T
         g[j][columns] = B @ observation.Y[observation.joint(j)]
-    return Normal(G, g)
+    return NormalEquations(G, g)
 
 
-def _normal(W: Sequence[Array], Y: Sequence[Array]) -> Normal:
-    return Normal(np.array([A.T @ A for A in W]), np.array([A.T @ y for A, y in zip(W, Y, strict=True)]))
+def _normal(W: Sequence[Array], Y: Sequence[Array]) -> NormalEquations:
+    return NormalEquations(np.array([A.T @ A for A in W]), np.array([A.T @ y for A, y in zip(W, Y, strict=True)]))

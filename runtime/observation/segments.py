@@ -53,7 +53,7 @@ def merged(parts: Iterable[Sequence[JointFactor]]) -> tuple[JointFactor, ...]:
     )
 
 
-class KeptRows:
+class HeldRows:
     """The first rows of several records in the order of an Observation: joint by joint, records one after the other.
 
     Parameters

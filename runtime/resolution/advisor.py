@@ -35,7 +35,8 @@ from runtime.estimators.methods import linear_system
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, joint_units
 from runtime.observation.observation import stack
-from runtime.observation.position_errors import Normal, Perturbation, perturbation
+from runtime.observation.position_errors import NormalEquations, Perturbation, perturbation
+from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.advice import Advice, EncoderAdvice, Limit, Sampled, crossing, sampled
 from runtime.resolution.perturbed import Task, prepared, study_columns, system_of
@@ -82,14 +83,14 @@ class Predictor:
         clean = self._total(0.0, ())
         X = clean.solve(self.weights)
         added = reduce(add, [part.smooth[i] for part in self.parts for i in encoders])
-        moved = Normal(clean.G, added.g - added.G @ X).solve(self.weights)
+        moved = NormalEquations(clean.G, added.g - added.G @ X).solve(self.weights)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(100 * self.share * moved / X)
 
     def _solved(self, variance: float, encoders: Sequence[int]) -> Array:
         return self._total(variance, encoders).solve(self.weights)
 
-    def _total(self, variance: float, encoders: Sequence[int]) -> Normal:
+    def _total(self, variance: float, encoders: Sequence[int]) -> NormalEquations:
         return reduce(add, [part.expected(variance, encoders) for part in self.parts])
 
 
@@ -130,7 +131,7 @@ def advise(
     progress : callable, optional
         Called with the number of choices of encoders done and their total.
     provenance : mapping, optional
-        Further entries of Advice.provenance.
+        Further entries of Advice.provenance; names and time stamps of the records are there.
 
     Raises
     ------
@@ -145,7 +146,7 @@ def advise(
     settings = replace(study.estimate, columns="all")
     measured = stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
     system = linear_system(measured, settings)
-    reference = assemble(system, system.solve(), model=model, provenance=provenance)
+    reference = assemble(system, system.solve(), model=model, provenance={**origin(records), **(provenance or {})})
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[study.cestac.rounding])
     decisive = [names.index(name) for name in deciding_names(reference)]
     every = range(len(model.JOINTS))

@@ -14,7 +14,7 @@ from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
 from runtime.errors import SettingsError
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.feasibility import Ellipsoid, Limits, feasibility, limit_rows, pulled, scales, standard_parameters
+from runtime.estimators.feasibility import Ellipsoid, RobotLimits, feasibility, limit_rows, pulled, scales, standard_parameters
 from runtime.estimators.feasible import FeasibleOptions, residual_norm, weighed
 from runtime.estimators.methods import estimate_of
 from runtime.estimators.physical import negative_elements
@@ -163,7 +163,7 @@ def test_infeasible_parameters_are_blamed_on_what_contradicts(arm) -> None:
     X = X.copy()
     X[arm.BASE_PARAMETERS.index("FV2")] = -0.2
     X[arm.BASE_PARAMETERS.index("ZZ2")] = 0.05  # with MX2 = 0.5 kg m and at most 2 kg: ZZ2 >= MX2**2/M2 = 0.125
-    judged = feasibility(physical, physical.base, X, Limits(bounds={"M2": (None, 2.0)}))
+    judged = feasibility(physical, physical.base, X, RobotLimits(bounds={"M2": (None, 2.0)}))
     assert not judged.feasible and [name for name, _ in judged.blocking] == ["FV2", "link 2"]
     assert judged.margin == pytest.approx(-0.2, abs=1e-6)
     with pytest.raises(InputError, match=r"NOT physically feasible.*FV2"):
@@ -181,7 +181,7 @@ def test_standard_parameters_have_the_same_torques(tx40) -> None:
 
 def test_limits_hold(arm) -> None:
     physical = physical_model(arm)
-    limits = Limits(
+    limits = RobotLimits(
         bounds={"M1": (None, 1.5)},
         total_mass=(3.0, 3.5),
         centre={"2": ((0.0, 0.3), (-0.1, 0.1), (-0.1, 0.1))},

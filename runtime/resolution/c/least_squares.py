@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg.lapack import dgeqrf
 
-from runtime.estimators.normal_equations import LIMIT, LeastSquares, Normal
+from runtime.estimators.normal_equations import LIMIT, JointEquations, LeastSquares
 from runtime.estimators.solution import solve
 from runtime.observation.qr_factor import Factor, JointFactor
 from runtime.resolution.c.kernels import LANES, SIDE, SPAN, EntriesStructure, Room, RowsStructure, SignalEntries, address, call
@@ -61,7 +61,7 @@ class KeptRows:
         self.widths = [-(-count // SIDE) * SIDE for count in self.counts]
         self.parts = [(y, np.ascontiguousarray(Y, dtype=float), np.ascontiguousarray(mask, dtype=np.uint8)) for y, Y, mask in parts]
 
-    def normal(self) -> Normal:
+    def normal(self) -> JointEquations:
         """Gram matrices of [W_j Y_j] by joint."""
         A = self.room.array("A", sum(w * w for w in self.widths))
         A.fill(0)
@@ -70,7 +70,7 @@ class KeptRows:
         for width, count in zip(self.widths, self.counts, strict=True):
             grams.append(A[end : end + width * width].reshape(width, width)[:count, :count].copy())
             end += width * width
-        return Normal(self.entries.columns, tuple(grams), len(self.entries.names))
+        return JointEquations(self.entries.columns, tuple(grams), len(self.entries.names))
 
     def gradient(self, X: Array) -> tuple[list[Array], Array]:
         """W_j'(Y_j - W_j X) and ||Y_j - W_j X||^2 by joint."""
