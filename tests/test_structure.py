@@ -33,7 +33,6 @@ ONLY_IN = {  # library: files and folders that may import it
     "pydantic": ("symgen/description/", "runtime/errors.py", "runtime/settings/", "runtime/json_documents.py"),
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/settings/yaml.py"),
     "sympy": ("symgen/regroup/formula.py",),
-    "mpmath": ("symgen/derive/precise.py", "symgen/regroup/general.py"),
     "casadi": ("symgen/derive/lagrange.py", "runtime/motion/", "runtime/excitation/optimiser.py", "generated/"),
     "pooch": ("runtime/records/datasets.py",),
     "pint": ("runtime/settings/units.py",),

@@ -185,7 +185,7 @@ massless: [3, 4]
 
 
 def test_column_that_rounding_alone_fills_is_zero() -> None:
-    """A right angle is not exact in 60 digits: MZ2 has no effect, and its column is 1e-60."""
+    """A right angle is not exact in floats: MZ2 has no effect, and its column is rounding."""
     found = regroup(parse_robot(ON_A_TURRET.encode(), "turret.yaml"))
     assert "MZ2" in found.no_effect
     assert certify_formulas(found).valid
