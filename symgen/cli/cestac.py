@@ -49,7 +49,6 @@ def cestac(
     given = {"delta": delta, "torque": torque, "runs": runs, "rounding": rounding, "side": side, "seed": seed}
     with reported_errors(), reserved(output) as results:
         import runtime
-        from runtime.records.provenance import origin
         from runtime.records.reading import read_records
         from runtime.reporting.resolution import resolution_text
         from runtime.resolution.checkpoint import Checkpoint
@@ -61,13 +60,12 @@ def cestac(
         result: runtime.Cestac | runtime.Advice
         try:
             with session.progress_bar("encoders" if advise else "runs") as progress:
-                shared: dict[str, Any] = {"progress": progress, "provenance": origin(records)}
                 if advise:
-                    result = advice = runtime.advise(model, records, study, asked=study.cestac.delta if delta else (), **shared)
+                    result = advice = runtime.advise(model, records, study, asked=study.cestac.delta if delta else (), progress=progress)
                     text, negative = f"{advice.to_table()}\n\n{advice.verdict}", advice.negative
                 else:
-                    shared |= {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint}
-                    result = resolution = runtime.cestac(model, records, study, **shared)
+                    place: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint}
+                    result = resolution = runtime.cestac(model, records, study, progress=progress, **place)
                     text, negative = resolution_text(resolution), resolution.verdict == "biased"
         except KeyboardInterrupt:
             session.stopped(checkpoint)

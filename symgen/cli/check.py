@@ -6,12 +6,13 @@ from typing import Annotated
 
 import typer
 
-from symgen.cli.doubts import tell_doubts
+from symgen.cli.described import AT_VALUES, described_robot
 from symgen.cli.session import NEGATIVE, reported_errors, single_thread
 
 
 def check(
     robot: Annotated[str, typer.Argument(help="Packaged robot or robot file (.yaml, .par, .urdf).")],
+    at_values: Annotated[bool, typer.Option("--at-values", help=AT_VALUES)] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the certificate as JSON.")] = False,
 ) -> None:
     """Verify ROBOT: exact rank, identities at fresh geometry, numeric rank and torques by CasADi energies, the emitted module."""
@@ -19,12 +20,10 @@ def check(
     with reported_errors():
         from json import dumps
 
-        from symgen.description import load_robot
         from symgen.emit.certified import certify
         from symgen.regroup.regrouping import regroup
 
-        described = load_robot(robot)
-        tell_doubts(described)
+        described = described_robot(robot, at_values)
         certificate = certify(regroup(described))
         typer.echo(dumps(certificate.mapping(), indent=2) if json else str(certificate))
     if not certificate.valid:

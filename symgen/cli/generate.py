@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from runtime.result_files import write_all
-from symgen.cli.doubts import tell_doubts
+from symgen.cli.described import AT_VALUES, described_robot
 from symgen.cli.session import NEGATIVE, fail, reported_errors
 from symgen.emit.targets import TARGETS
 
@@ -24,6 +24,7 @@ def generate(
     target: Annotated[
         str, typer.Option(help="What to emit: numpy, casadi, c, xp (arrays of any package), or several as numpy,c.")
     ] = "numpy",
+    at_values: Annotated[bool, typer.Option("--at-values", help=AT_VALUES)] = False,
     check: Annotated[bool, typer.Option("--check", help="Write nothing; fail with a diff where a module is not current.")] = False,
 ) -> None:
     """Derive the models of each ROBOT and write them as OUTPUT/<name>.py, _casadi.py, .c or _xp.py. All are written, or none."""
@@ -31,7 +32,7 @@ def generate(
         targets = tuple(dict.fromkeys(part.strip() for part in target.split(",")))
         if unknown := [part for part in targets if part not in TARGETS]:
             fail(f"target {', '.join(map(repr, unknown))}; there is {', '.join(TARGETS)}")
-        modules = emitted(robots, targets)
+        modules = emitted(robots, targets, at_values)
         if check:
             report_differences(output, modules)
             return
@@ -39,16 +40,16 @@ def generate(
             typer.echo(f"{path}")
 
 
-def emitted(robots: list[str], targets: Sequence[str] = ("numpy",)) -> dict[str, str]:
+def emitted(robots: list[str], targets: Sequence[str] = ("numpy",), at_values: bool = False) -> dict[str, str]:
     """{file name: text} of every robot and target. Raises SymgenError before anything is written."""
-    from symgen.description import load_robot, packaged_robots
+    from symgen.description import packaged_robots
     from symgen.emit.certified import certified_files
 
     modules: dict[str, str] = {}
     for source in packaged_robots() if robots == ["all"] else robots:
-        robot = load_robot(source)
-        tell_doubts(robot)
-        files = certified_files(robot, targets=targets, command=source if source in packaged_robots() else robot.file)
+        robot = described_robot(source, at_values)
+        command = (source if source in packaged_robots() else robot.file) + " --at-values" * at_values
+        files = certified_files(robot, targets=targets, command=command)
         if modules.keys() & files.keys():
             fail(f"two robots are called {robot.name}; their modules would overwrite each other")
         for left_out in (t for t in targets if TARGETS[t].file.format(robot.name) not in files):

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from runtime.result_files import write_all
-from symgen.cli.doubts import tell_doubts
+from symgen.cli.described import AT_VALUES, described_robot
 from symgen.cli.session import NEGATIVE, fail, reported_errors, single_thread
 
 FORMATS = ("text", "latex", "json")
@@ -17,6 +17,7 @@ FORMATS = ("text", "latex", "json")
 def show(
     robot: Annotated[str, typer.Argument(help="Packaged robot or robot file (.yaml, .par, .urdf).")],
     format: Annotated[str, typer.Option(help="text, latex or json.")] = "text",
+    at_values: Annotated[bool, typer.Option("--at-values", help=AT_VALUES)] = False,
     only: Annotated[str | None, typer.Option(help="One base parameter, e.g. XX2R.")] = None,
     recursive: Annotated[bool, typer.Option("--recursive", help="Link by link, as SYMORO prints, instead of flat as eq. (27).")] = False,
     json: Annotated[bool, typer.Option("--json", help="Same as --format json.")] = False,
@@ -45,14 +46,12 @@ def show(
             fail(message)
     with reported_errors():
         from symgen.cli.formula_text import print_coloured
-        from symgen.description import load_robot
         from symgen.emit.certified import certify
         from symgen.regroup.regrouping import regroup
         from symgen.report.formulas import printed
         from symgen.report.page import robot_page
 
-        described = load_robot(robot)
-        tell_doubts(described)
+        described = described_robot(robot, at_values)
         regrouping = regroup(described)
         certificate = certify(regrouping)
         if html:

@@ -75,7 +75,7 @@ def require_valid(certificate: Certificate) -> None:
     """Raise CertificateError unless the certificate holds."""
     if not certificate.valid:
         wrong = [line for line in str(certificate).splitlines()[1:-1] if not line.startswith("ok")]
-        reason = wrong[0].removeprefix("FALSE ")
+        reason = next((text for text in certificate.failures if AT_VALUES in text), wrong[0].removeprefix("FALSE "))
         raise CertificateError(
             f"{certificate.name}: the certificate does not hold ({reason}); no module is emitted; `symgen check` prints every check",
             certificate,

@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 
 Sampler = Callable[[Draw, tuple[str, ...]], Array]
 ROUNDED = 1e-7  # of the largest entry: columns by coefficients that are numbers
+ZERO_BELOW = 1e-9  # rad, m or a cosine: a denominator that is zero but for rounding
+AT_VALUES = "say --at-values for the regrouping that does"
 SURE, MOST_DRAWS = 1e-12, 8  # largest probability that a false identity passes, and draws over F_p at most
 TOLERANCE = 1e-9  # relative to the largest entry: rounding of some thousand operations and of the closed loops
 
@@ -187,6 +190,13 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
         failures += [
             f"column of {name} is not what the formulas say (modulo {p})" for p, names in zip(primes, wrong, strict=True) for name in names
         ]
+    special = [f"{text}; the formulas do not hold there, {AT_VALUES}" for text in vanishing_denominators(regrouping)]
+    if rank < len(regrouping) == exact_rank:
+        values = ", ".join(f"{name} = {value:g}" for name, value in robot.constants.items())
+        special.append(
+            f"the constants of the file ({values}) are special: the rank is {rank} there, {len(regrouping)} elsewhere; {AT_VALUES}"
+        )
+    failures += special
     chi = np.random.default_rng(6).standard_normal(len(robot.parameters))
     tau = witness.W @ chi
     error = float(np.abs(tau - witness.W[:, base] @ base_values(regrouping, chi)).max() / np.abs(tau).max())
@@ -204,6 +214,19 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
         general=bool(close(robot).tied),
         error_probability=bound**draws if primes else 1.0,
     )
+
+
+def vanishing_denominators(regrouping: Regrouping) -> list[str]:
+    """Denominators of coefficients that are zero at the constants of the robot file, a sentence each."""
+    values, texts = regrouping.robot.constants, []
+    for b in regrouping.base:
+        below = {a for c in b.combination.values() for m in c.terms for a, n in m if n < 0 or (isinstance(a, Call) and a.function == "inv")}
+        for a in sorted(below, key=str):
+            base = a.argument if isinstance(a, Call) and a.function == "inv" else Expression({((a, 1),): Fraction(1)})
+            if abs(base.value(values)) < ZERO_BELOW:
+                at = ", ".join(f"{name} = {values[name]:g}" for name in sorted(base.symbols))
+                texts.append(f"{b.name} = {b.formula} divides by {base}, which is zero at {at}")
+    return texts
 
 
 def degree(regrouping: Regrouping) -> int:

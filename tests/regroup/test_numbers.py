@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 from campaign import FULL, campaign
 
 from oracles.numeric_robots import describe_numbers, numeric_robot
-from symgen import Robot, certify, parse_robot, regrouping
+from symgen import Robot, SymgenError, certify, load_robot, parse_robot, regrouping
+from symgen.description.at_values import at_values, exact
 from symgen.description.expression import Expression, Number, call
+from symgen.emit.certified import certified_files
 from symgen.regroup.certificate import Certificate, certify_formulas
 from symgen.regroup.numbers import kept
 from symgen.regroup.regrouping import BaseParameter, Regrouping
@@ -134,6 +138,26 @@ def test_kept_numbers_have_their_value() -> None:
     e = Expression.number("0.4318") * Expression.symbol("a") - 2
     assert kept(e) != e and kept(e).value({"a": 3.0}) == e.value({"a": 3.0})
     assert {a for a in kept(e).atoms if isinstance(a, Number)} and str(kept(e)) == "0.4318*a - 2"
+
+
+def test_values_at_which_a_formula_divides_by_zero_are_told() -> None:
+    """A right angle of the haptic interface: tan(c) grows without bound; the regrouping at the values holds."""
+    robot = load_robot("haptic")
+    special = replace(robot, constants={**robot.constants, "c": math.pi / 2})
+    certificate = certify(regrouping(special))
+    assert not certificate.valid
+    assert "divides by cos(c), which is zero at c = 1.5708" in certificate.failures[-1] and "--at-values" in certificate.failures[-1]
+    with pytest.raises(SymgenError, match="cos\\(c\\), which is zero at c = 1.5708.*--at-values"):
+        certified_files(special)
+    found = regrouping(at_values(special))
+    assert certify(found).valid and not found.robot.constants
+
+
+def test_constants_become_their_decimals() -> None:
+    assert exact(0.4318) == Expression.number("0.4318") and exact(1.5707963267948966, angle=True) == Expression.symbol("pi") * Fraction(
+        1, 2
+    )
+    assert exact(0.5, angle=True) == Expression.number("0.5")
 
 
 def perturbed(found: Regrouping, rng: np.random.Generator) -> list[Regrouping]:
