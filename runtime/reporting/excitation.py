@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 
-from runtime.reporting.figures import STYLE, panels_figure
+from runtime.reporting.figures import STYLE, panels_figure, shared_legend
 from runtime.reporting.page import Image, Page, Section
 
 if TYPE_CHECKING:
@@ -41,8 +41,7 @@ def motion_figure(excitation: Excitation) -> Figure:
             ax.set_title(title, fontsize=9)
             ax.set_xlim(t[0], t[-1])
         axes[-1].set_xlabel("time, s")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, ncols=min(6, len(excitation.model.JOINTS)), loc="outside upper center", fontsize=8)
+        shared_legend(figure, axes[0], min(6, len(excitation.model.JOINTS)), size=8)
     return figure
 
 

@@ -71,13 +71,10 @@ def torque_overlay(comparison: Comparison, unit: str = "N m", source: str = "mea
     columns = 1 if len(joints) == 1 else 2
     rows = -(-len(joints) // columns)
     with mpl.rc_context(STYLE):
-        figure, axes = panels_figure(rows, columns, (4.8 * columns, 2.3 * rows + 0.4))
+        figure, axes = panels_figure(rows, columns, (4.8 * columns, 2.3 * rows + 0.4), used=len(joints))
         for ax, joint in zip(axes, joints, strict=False):
             _overlay(ax, joint, unit, source)
-        for ax in axes[len(joints) :]:
-            ax.set_visible(False)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, ncols=3, loc="outside upper center")
+        shared_legend(figure, axes[0], 3)
     return figure
 
 
@@ -87,7 +84,7 @@ def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
     columns = min(3, len(joints))
     rows = -(-len(joints) // columns)
     with mpl.rc_context(STYLE):
-        figure, axes = panels_figure(rows, columns, (max(5.4, 3.2 * columns), 2.1 * rows + 0.4))
+        figure, axes = panels_figure(rows, columns, (max(5.4, 3.2 * columns), 2.1 * rows + 0.4), used=len(joints))
         for ax, joint in zip(axes, joints, strict=False):
             deviation = float(np.std(joint.error)) or 1.0
             x = np.linspace(-4, 4, 161)
@@ -98,8 +95,6 @@ def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
             ax.set_title(f"joint {joint.joint}, deviation {deviation:.3g} {unit}", fontsize=9)
             ax.set_xlabel("residual / deviation")
             ax.set_yticks([])
-        for ax in axes[len(joints) :]:
-            ax.set_visible(False)
     return figure
 
 
@@ -141,7 +136,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
         ax.set_xticks([], minor=True)
         ax.set_xlabel(f"resolution Δ, {unit}")
         ax.set_ylabel("%e: change of the estimate, %")
-        figure.legend(ncols=4, loc="outside upper center", fontsize=8)
+        shared_legend(figure, ax, 4, size=8)
     return figure
 
 
@@ -175,9 +170,19 @@ def _drawn(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values) & (values > 0), values, np.nan)
 
 
-def panels_figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+def panels_figure(rows: int, columns: int, size: tuple[float, float], *, used: int | None = None) -> tuple[Figure, list[Axes]]:
+    """A figure of `size`, inch, and its panels row by row; those beyond `used` are blank."""
     figure = empty_figure(size)
-    return figure, list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
+    axes = list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
+    for ax in axes[used:] if used is not None else ():
+        ax.set_visible(False)
+    return figure, axes
+
+
+def shared_legend(figure: Figure, ax: Axes, columns: int, *, size: float = STYLE["font.size"]) -> None:
+    """The legend of one panel above the figure."""
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, ncols=columns, loc="outside upper center", fontsize=size)
 
 
 def empty_figure(size: tuple[float, float]) -> Figure:

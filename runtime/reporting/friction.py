@@ -20,7 +20,7 @@ def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figur
     lines = -(-len(curves) // columns)
     speed = "m/s" if unit == "N" else "rad/s"
     with mpl.rc_context(plots.STYLE):
-        figure, axes = plots.panels_figure(lines, columns, (4.8 * columns, 2.9 * lines + 0.4))
+        figure, axes = plots.panels_figure(lines, columns, (4.8 * columns, 2.9 * lines + 0.4), used=len(curves))
         for ax, curve in zip(axes, curves, strict=False):
             ax.plot(curve.v, curve.f, ".", color="#C8C8C8", markersize=2, zorder=1, label="rows", rasterized=True)
             ax.errorbar(curve.centre, curve.mean, curve.half, fmt="o", color=plots.BLACK, markersize=3, linewidth=1.0, label="bins, 95 %")
@@ -35,8 +35,6 @@ def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figur
             ax.set_ylabel(f"friction, {unit}")
             ax.axhline(0, color=plots.GREY, linewidth=0.6)
             ax.axvline(0, color=plots.GREY, linewidth=0.6)
-        for ax in axes[len(curves) :]:
-            ax.set_visible(False)
         entries = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
         figure.legend(list(entries.values()), list(entries), ncols=2 * columns, loc="outside upper center")
     return figure

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from runtime.identification.residuals import Whiteness
 from runtime.identification.result import Identification
 from runtime.observation.decimation import CUTOFF
-from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, panels_figure, residual_histogram, svg
+from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, panels_figure, residual_histogram, shared_legend, svg
 from runtime.reporting.page import Image, Section
 
 
@@ -58,7 +58,7 @@ def spectra_figure(joints: Sequence[Whiteness], unit: str = "N m", cutoff: float
     columns = min(3, len(joints))
     rows = -(-len(joints) // columns)
     with mpl.rc_context(STYLE):
-        figure, axes = panels_figure(rows, columns, (max(5.4, 3.2 * columns), 2.0 * rows + 0.6))
+        figure, axes = panels_figure(rows, columns, (max(5.4, 3.2 * columns), 2.0 * rows + 0.6), used=len(joints))
         for ax, w in zip(axes, joints, strict=False):
             drawn = w.density > 0
             ax.semilogy(w.frequency[drawn], w.density[drawn], color=BLUE, linewidth=1.1, label="residuals")
@@ -69,9 +69,6 @@ def spectra_figure(joints: Sequence[Whiteness], unit: str = "N m", cutoff: float
             ax.minorticks_off()
             ax.set_title(f"joint {w.joint}", fontsize=9)
             ax.set_xlabel("frequency, Hz")
-        for ax in axes[len(joints) :]:
-            ax.set_visible(False)
         figure.supylabel(f"density, ({unit})²/Hz", fontsize=9)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, ncols=2, loc="outside upper center", fontsize=8)
+        shared_legend(figure, axes[0], 2, size=8)
     return figure

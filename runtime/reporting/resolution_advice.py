@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, panels_figure, svg
+from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, panels_figure, shared_legend, svg
 from runtime.reporting.page import Image, Section
 from runtime.resolution.advice import Advice, EncoderAdvice
 
@@ -22,15 +22,12 @@ def advice_figure(advice: Advice) -> Figure:
     rows = -(-len(names) // columns)
     first = advice.encoders[0]
     with mpl.rc_context(STYLE):
-        figure, axes = panels_figure(rows, columns, (max(4.6, 2.1 * columns), 1.5 * rows + 1.0))
+        figure, axes = panels_figure(rows, columns, (max(4.6, 2.1 * columns), 1.5 * rows + 1.0), used=len(names))
         for ax, name in zip(axes, names, strict=False):
             _panel(ax, first, advice.names.index(name), name)
-        for ax in axes[len(names) :]:
-            ax.set_visible(False)
         for k, ax in enumerate(axes[: len(names)]):
             ax.tick_params(labelleft=k % columns == 0, labelbottom=k + columns >= len(names), labelsize=7)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, ncols=3, loc="outside upper center", fontsize=8)
+        shared_legend(figure, axes[0], 3, size=8)
         figure.supxlabel(f"resolution Δ of every encoder, {advice.unit}", fontsize=9)
         figure.supylabel("%e: change of the estimate, %", fontsize=9)
     return figure

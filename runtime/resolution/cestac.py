@@ -30,6 +30,7 @@ from runtime.model.compiled import target_of, text_of
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.parallel import results
+from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.c.workspace import usable
 from runtime.resolution.checkpoint import Checkpoint
@@ -86,7 +87,7 @@ def cestac(
     checkpoint : Checkpoint, optional
         Where runs are kept while the study lasts; those of an interrupted or shorter study with the same settings are not repeated.
     provenance : mapping, optional
-        Further entries of Cestac.provenance.
+        Further entries of Cestac.provenance; names and time stamps of the records are there.
 
     Raises
     ------
@@ -117,7 +118,7 @@ def cestac(
     )
     measured = perturbed(model, task, Level(0.0), ())
     system = linear_system(measured, task.estimate)
-    reference = assemble(system, system.solve(), model=model, provenance=provenance)
+    reference = assemble(system, system.solve(), model=model, provenance={**origin(records), **(provenance or {})})
     described = {
         **measured.settings,
         "estimate": to_mapping(study.estimate),

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from runtime import Cestac, Identification
 from runtime.identification.operational_space import OperationalSpace, operational_space
 from runtime.markup import number
 from runtime.model.drives import Drives
-from runtime.records.provenance import origin
 from runtime.reporting import figures as plots
 from runtime.reporting.files import Files, identification_files, resolution_files
 from runtime.reporting.operational_space import operational_space_figure, operational_space_section
@@ -124,18 +122,18 @@ def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], No
     model, study, record = prepared.model, prepared.study, prepared.record
     progress("identification")
     result = runtime.identify(model, record, study)
-    given: dict[str, Any] = {"columns": result.essential.names, "provenance": origin([record])}
+    names = result.essential.names
     roundings: dict[str, Cestac] = {}
     ratios: dict[float, Cestac] = {}
     deltas = (study.cestac.delta[0], ONSET, *study.cestac.delta[1:])
     for rounding in ROUNDINGS[:1] if quick else ROUNDINGS:
         progress(f"encoder resolution, {rounding}")
         changed = replace(study, cestac=replace(study.cestac, rounding=rounding, delta=deltas))
-        roundings[rounding] = runtime.cestac(model, record, changed, **given)
+        roundings[rounding] = runtime.cestac(model, record, changed, columns=names)
     for ratio in () if quick else RATIOS:
         progress(f"encoder resolution, transmission ratio {ratio:g}")
         drives = Drives.from_mapping({"ratio": ratio * np.eye(len(model.JOINTS))})
-        ratios[ratio] = runtime.cestac(model, record, study, drives=drives, **given)
+        ratios[ratio] = runtime.cestac(model, record, study, columns=names, drives=drives)
     progress("operational space")
     handle = operational_space(model, result.essential.estimate, _sheet(), frame=HANDLE)
     X = model.base_parameters(model.VALUES)

@@ -26,7 +26,6 @@ from runtime.identification.coupling import recoupled
 from runtime.markup import number
 from runtime.model.drives import Drives
 from runtime.records.datasets import dataset_study
-from runtime.records.provenance import origin
 from runtime.records.reading import read_records
 from runtime.reporting.files import Files, identification_files, resolution_files
 from runtime.reporting.page import Section
@@ -133,7 +132,7 @@ def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], No
     def resolution(changed: Study, **settings: Any) -> Cestac:
         changed = replace(changed, cestac=replace(changed.cestac, **settings))
         columns = None if changed.cestac.columns != "essential" else names
-        return runtime.cestac(model, record, changed, columns=columns, provenance=origin([record]))
+        return runtime.cestac(model, record, changed, columns=columns)
 
     progress("encoder resolution")
     main = resolution(study)

@@ -173,8 +173,10 @@ def test_folder_that_cannot_be_written(tmp_path):
     assert result.exit_code == 2 and result.stderr.startswith("error: ")
 
 
-def test_blocks_give_the_same_result(tx40_data):
+@pytest.mark.parametrize("held", [100e6, 0], ids=["rows held", "rows reduced"])
+def test_blocks_give_the_same_result(tx40_data, monkeypatch, held):
     """Every figure of estimate.json but the settings, to 1e-9 of the largest of its kind."""
+    monkeypatch.setattr("runtime.observation.observation.HELD", held)
     whole, blocks = (json.loads(run("tx40", "tx40", "--json", *options).stdout) for options in ((), ("--block", 10000)))
     assert blocks["settings"].pop("stream") == {"block": 10000}
     for key in ("X", "sigma", "sigma_corrected"):
@@ -200,5 +202,6 @@ def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
 @campaign
 def test_report_says_what_its_figures_leave_out(tx40_data, tmp_path, monkeypatch):
     monkeypatch.setattr("runtime.observation.by_blocks.SHOWN", 300)
+    monkeypatch.setattr("runtime.observation.observation.HELD", 0)
     assert run("tx40", "tx40", "--block", 20000, "-o", tmp_path).exit_code == 0
     assert "figures show the first 1782 of 5592 rows" in (tmp_path / "report.html").read_text(encoding="utf-8")  # 6 (300 - 3), 6 (938 - 6)
