@@ -130,8 +130,8 @@ def archive(members, method=zipfile.ZIP_DEFLATED):
 
 
 def test_zip_bombs(reader):
-    zeros = npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (40000000,)}\n") + bytes(320_000_000)
-    bomb = archive({**npz_members(), "q1.npy": zeros})
+    zeros = npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (7500000,)}\n") + bytes(60_000_000)
+    bomb = archive(dict.fromkeys(npz_members(), zeros))
     assert len(bomb) < 1_000_000
     refused(reader, "npz", bytes(bomb), "unpacks to")
     at = bomb.rindex(b"PK\x01\x02", 0, bomb.index(b"q1.npy", bomb.index(b"PK\x01\x02")))  # its entry in the table says 100 bytes
@@ -162,14 +162,14 @@ def test_lines_without_end(reader):
     refused(reader, "csv", b"," * 10_000_000, "a line of more than")
     refused(reader, "csv", b"," * 900_000, "columns; at most")
     refused(reader, "csv", csv_file() + b"," * 10_000_000, "a line of more than")
-    refused(reader, "csv", b"\n" * 8_000_000, "lines; read them by blocks")
+    refused(reader, "csv", b"\n" * 8_000_000, "lines are empty or comments")
 
 
 def test_parquet_bombs(reader, tmp_path):
     """A constant column of any length takes no space."""
     polars = pytest.importorskip("polars")
     stream = io.BytesIO()
-    polars.select(q1=polars.repeat(1.0, 40_000_000)).write_parquet(stream, row_group_size=40_000_000)
+    polars.select(q1=polars.repeat(1.0, 40_000_000), tau1=polars.repeat(1.0, 40_000_000)).write_parquet(stream, row_group_size=40_000_000)
     assert len(stream.getvalue()) < 1_000_000
     refused(reader, "parquet", stream.getvalue(), "unpacks to")
 
@@ -182,7 +182,7 @@ def test_matlab_declares_more_than_it_holds(reader):
     flags, name = element(6, struct.pack("<II", 6, 0)), element(1, b"q1".ljust(8, b"\0"), 2)
     for n, m in ((2**31 - 1, 2**31 - 1), (2**30, 1), (-1, -1), (-1, 12)):
         array = flags + element(5, struct.pack("<ii", n, m)) + name + element(9, bytes(96))
-        refused(reader, "mat", head + element(14, array), "dimensions")
+        refused(reader, "mat", head + element(14, array), "case.mat")
     refused(reader, "mat", head + element(14, flags, 2**32 - 8), "damaged")
     cell = element(6, struct.pack("<II", 1, 0)) + element(5, struct.pack("<ii", 1, 1)) + name
     nested = b""
