@@ -27,7 +27,7 @@ from symgen.emit.header import one_sided_friction_that_absorbs
 from symgen.emit.importing import cached_path, imported, stored_path
 from symgen.emit.targets import TARGETS
 from symgen.errors import CertificateError, SymgenError
-from symgen.regroup.certificate import Certificate, certify_formulas, independent
+from symgen.regroup.certificate import AT_VALUES, Certificate, certify_formulas, independent
 from symgen.regroup.regrouping import Regrouping, regroup
 
 STATES = 5  # for the models that are one column of the regressor each
