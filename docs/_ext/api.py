@@ -6,6 +6,7 @@ import ast
 import inspect
 import re
 from collections.abc import Iterator
+from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -169,7 +170,10 @@ def arguments(value: Any, *, bound: bool = False) -> str:
 
 
 def parameters(value: Any) -> list[str]:
-    """Names and defaults; types are in the docstring."""
+    """Names and defaults; types are in the docstring. Those of a dataclass are its fields, which pydantic completes only when it makes the first."""
+    if inspect.isclass(value) and is_dataclass(value):
+        starred = [f for f in fields(value) if f.init and f.kw_only]
+        return [field(f) for f in fields(value) if f.init and not f.kw_only] + ["*"] * bool(starred) + [field(f) for f in starred]
     try:
         listed = list(inspect.signature(value).parameters.values())
     except (ValueError, TypeError):
@@ -183,6 +187,12 @@ def parameters(value: Any) -> list[str]:
         star = {p.VAR_POSITIONAL: "*", p.VAR_KEYWORD: "**"}.get(p.kind, "")
         found.append(star + p.name + ("" if p.default is p.empty else f"={default(p.default)}"))
     return found
+
+
+def field(f: Field[Any]) -> str:
+    if f.default_factory is not MISSING:
+        return f"{f.name}=..."
+    return f.name if f.default is MISSING else f"{f.name}={default(f.default)}"
 
 
 def default(value: Any) -> str:
@@ -209,9 +219,7 @@ def names(package: str) -> str:
         link = f"[`{name}`](#{name.lower()})" if callable(thing) else f"`{name}`"
         rows.append((link, first_line(thing.__doc__)))
         described_here = (
-            list(described_in_full(thing))
-            if inspect.isfunction(thing)
-            else [f"```text\n{signature(thing)}\n```", markdown(thing.__doc__)]
+            list(described_in_full(thing)) if inspect.isfunction(thing) else [f"```text\n{signature(thing)}\n```", markdown(thing.__doc__)]
         )
         parts += [f"### `{name}`", *described_here, f"More of this room: [{home}]({home}.md)." if f"{package}.{home}" in rooms() else ""]
     return "\n\n".join(part for part in [table(("name", ""), rows).strip(), *parts] if part) + "\n"
