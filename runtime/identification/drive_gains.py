@@ -108,7 +108,19 @@ class DriveGains:
 def drive_gains(
     model: GeneratedModel, without: Sequence[Record], loaded: Sequence[Record], study: Study, settings: PayloadSettings, *, seed: int = 1
 ) -> DriveGains:
-    """Gains from joint-side records without and with a load of known mass; seed : of the resampling."""
+    """Gains from records without and with a load of known mass.
+
+    Parameters
+    ----------
+    without, loaded : sequence of Record
+        Joint side, without and with the load.
+    study : Study
+        Signals and rows.
+    settings : PayloadSettings
+        Where the load is fixed, and its mass.
+    seed : int
+        Of the resampling.
+    """
     if not without or not loaded or "M" not in settings.known:
         raise InputError("drive gains need a record without the load, one with it, and its weighed mass (payload.known: {M: ...})")
     drives = Drives.from_mapping(model.DRIVES or {"ratio": np.eye(len(model.JOINTS))})

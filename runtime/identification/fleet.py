@@ -82,7 +82,15 @@ class FleetSettings(Settings):
 
 @dataclass(frozen=True)
 class Job:
-    """One identification with a name of its own, files relative to the current folder."""
+    """One identification.
+
+    Attributes
+    ----------
+    name : str
+        Distinct among the jobs; that of its folder.
+    robot, record : str
+        As on the command line of `symgen identify`; files relative to the current folder.
+    """
 
     name: str
     robot: str
@@ -157,7 +165,15 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Finished:
-    """What a job gives: its line, and the contents of its folder by file name."""
+    """What a job gives.
+
+    Attributes
+    ----------
+    row : Row
+        Its line of the summary.
+    files : mapping of str to str or bytes
+        Contents of its folder by file name.
+    """
 
     row: Row
     files: Files = field(default_factory=dict)
@@ -287,7 +303,17 @@ def _loaded(load: Callable[[str], GeneratedModel], robot: str) -> tuple[Generate
 
 @dataclass(frozen=True, eq=False)
 class Packer:
-    """Reads what jobs need; `load` gives the model of a robot and its text."""
+    """Reads what jobs need.
+
+    Attributes
+    ----------
+    load : function of str to (GeneratedModel, ModelText)
+        The model of a robot and its text.
+    folder : Path
+        Where the folders of the jobs are to lie.
+    files : function of Identification and Path to mapping, or None
+        As for `identify_fleet`.
+    """
 
     load: Callable[[str], tuple[GeneratedModel, ModelText]]
     folder: Path

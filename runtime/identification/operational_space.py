@@ -35,7 +35,7 @@ Array = np.ndarray
 SINGULAR = 1e-2
 """Smallest over largest singular value of J below which a configuration is singular."""
 SLOW = 1e-3
-"""Speed of the handle at which friction is told, m/s: dry friction alone, in practice."""
+"""Speed of the handle at which friction is evaluated, m/s: dry friction alone, in practice."""
 STEP = 1e-5
 """Step of the differences for the stiffness, rad or m: truncation and rounding errors are both near 1e-10 of the force."""
 Linear = Callable[[Array], Array]  # X of shape (b,) to a quantity of shape (N, ...), linear in X
@@ -125,10 +125,27 @@ def operational_space(
 
     Parameters
     ----------
-    estimate : of all base parameters or of some; those it lacks count as exactly zero.
-    q : ndarray, shape (N, n), actuated joints, rad or m.
-    axes : coordinates of frame 0 in which the handle is free, 0 x, 1 y, 2 z, at most n; (0, 1) for a robot in the x0-y0 plane.
-    speed : of the handle where friction is told, m/s.   singular : limit of the conditioning of J.   constants : in place of the robot file's.
+    model : GeneratedModel
+        With Jacobian, poses and dynamics.
+    estimate : Estimate
+        Of all base parameters or of some; those it lacks count as exactly zero.
+    q : ndarray, shape (N, n), rad or m
+        Actuated joints.
+    frame : int, optional
+        Number of the frame at whose origin the user holds the robot.
+    axes : sequence of int
+        Coordinates of frame 0 in which the handle is free, 0 x, 1 y, 2 z, at most n; (0, 1) for a robot in the x0-y0 plane.
+    speed : float, m/s
+        Of the handle where friction is evaluated.
+    singular : float
+        Conditioning of J below which a configuration is singular.
+    constants : mapping of str to float, optional
+        In place of the robot file's.
+
+    Raises
+    ------
+    InputError
+        Shapes, axes, frame or names that do not suit the model.
     """
     require(model, "jacobian", "frame_poses", "inertia_matrix", "bias", "gravity")
     q = np.atleast_2d(np.asarray(q, dtype=float))

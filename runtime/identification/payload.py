@@ -104,7 +104,19 @@ def payload(
     *,
     provenance: Mapping[str, Any] | None = None,
 ) -> Payload:
-    """The load from observations without and with it, fitted together with all base parameters by a linear method (ols or wls)."""
+    """The load from observations without and with it, fitted together with all base parameters.
+
+    Parameters
+    ----------
+    without, loaded : sequence of Observation
+        Rows of the records without and with the load, held.
+    settings : PayloadSettings
+        Where the load is fixed, and which of its parameters are known.
+    method : EstimateSettings, optional
+        ols or wls; default: ols.
+    provenance : mapping, optional
+        Further entries of the provenance of the estimate.
+    """
     if not without or not loaded:
         raise InputError("a payload needs a record without it and one with it (record, payload.record)")
     physical = physical_model(model)

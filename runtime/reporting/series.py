@@ -19,7 +19,19 @@ MOST = 6000
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Two lines over time with their difference: `first` and `second` of shape (N,), in `unit`; `labels` of the two."""
+    """Two lines over time with their difference.
+
+    Attributes
+    ----------
+    t : ndarray, shape (N,), s
+    first, second : ndarray, shape (N,), unit
+        The lines; nan breaks them.
+    labels : (str, str)
+        Of the lines.
+    unit : str
+    total : int
+        Instants before thinning.
+    """
 
     t: Array
     first: Array
