@@ -1,4 +1,4 @@
-"""ROS 1 bags (.bag), ROS 2 bags (a folder with metadata.yaml, or its .db3), and MCAP files, by rosbags (extra `bags`).
+"""ROS 1 bags (.bag), ROS 2 bags (a folder with metadata.yaml, or its .db3), and MCAP files, by rosbags (pip install symgen[bags]).
 
 Messages are read by the definition of JointState that ROS has, never by one that a bag brings along: rosbags would turn that into code and run it.
 A bag whose JointState is another one is refused. Time is the stamp of the header, or the time of the log where every stamp is zero.

@@ -1,4 +1,4 @@
-"""MATLAB files: versions 4 to 7 by scipy, 7.3 (an HDF5 file) by h5py (extra `tables`).
+"""MATLAB files: versions 4 to 7 by scipy, 7.3 (an HDF5 file) by h5py (pip install symgen[tables]).
 
 Numeric and logical arrays are read. Cells, structures, texts and sparse matrices are listed with their class and never loaded: a column of one is
 refused by name. Arrays of version 7.3 are stored by columns, so that h5py shows them transposed; they are turned back.

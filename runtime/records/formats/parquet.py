@@ -1,4 +1,4 @@
-"""Parquet files, by polars (extra `tables`)."""
+"""Parquet files, by polars (pip install symgen[tables])."""
 
 from __future__ import annotations
 

@@ -37,8 +37,8 @@ class Format:
         The table of a file.
     libraries : tuple of str
         Modules that read it; none: it is read in this process.
-    extra : str
-        Optional dependencies of this project that bring the libraries.
+    install : str
+        Command that brings the libraries.
     by_blocks : bool
         Whether a file larger than memory can be read.
     packed : str
@@ -51,7 +51,7 @@ class Format:
     endings: tuple[str, ...]
     open: Callable[[Source], Table]
     libraries: tuple[str, ...] = ()
-    extra: str = ""
+    install: str = ""
     by_blocks: bool = True
     packed: Literal["parts", "whole", ""] = "whole"
     digest: Callable[[Path], str] = sha256_of
@@ -61,9 +61,9 @@ FORMATS = (
     Format("a text file", (".csv", ".txt", ".dat", ".tsv"), open_text, packed="parts"),
     Format("a file of one plain array", (".npy",), open_npy),
     Format("an archive of plain arrays", (".npz",), open_npz),
-    Format("a Parquet file", (".parquet",), open_parquet, ("polars",), "tables"),
-    Format("a MATLAB file", (".mat",), open_mat, ("scipy.io",), "tables", by_blocks=False),
-    Format("a whole bag", (".bag", ".mcap", ".db3"), open_bag, ("rosbags",), "bags", False, "", digest_of),
+    Format("a Parquet file", (".parquet",), open_parquet, ("polars",), "pip install symgen[tables]"),
+    Format("a MATLAB file", (".mat",), open_mat, ("scipy.io",), "pip install symgen[tables]", by_blocks=False),
+    Format("a whole bag", (".bag", ".mcap", ".db3"), open_bag, ("rosbags",), "pip install symgen[bags]", False, "", digest_of),
 )
 BY_ENDING = {ending: format_ for format_ in FORMATS for ending in format_.endings}
 KINDS = tuple(BY_ENDING)
@@ -97,7 +97,7 @@ def open_table(path: Path, topic: str | None = None, decimal: str = ".", *, by_b
 
 def needed(format_: Format) -> str:
     """What to install where a library is missing."""
-    return f"{format_.title} needs an optional library: pip install symgen[{format_.extra}]"
+    return f"{format_.title} needs an optional library: {format_.install}"
 
 
 def require_readable(path: Path, format_: Format, by_blocks: bool) -> None:
