@@ -14,6 +14,7 @@ from symgen.emit.models import MODELS
 from symgen.emit.spec import WIDTH, Function, ModuleSpec, unpacked
 from symgen.errors import SymgenError
 from symgen.regroup.formula import Python
+from symgen.regroup.regrouping import sign_conditions
 from symgen.version import VERSION
 
 OWN = {"states", "GAM", "T", "rates", "offsets"}  # what the templates assign before they pass constants on
@@ -52,6 +53,13 @@ def context(spec: ModuleSpec, command: str | None, language: Python, array: str,
         "passed": {name: f.constants for name, f in spec.functions.items()},
         "unpack": unpacked([name if name in read else "_" for name in robot.parameters], "standard"),
         "formulas": [f"{name} = {language.formula(formula)}" for name, formula in formulas],
+        "conditions": [
+            (
+                f"{source(language, ratio)} {'>' if sign > 0 else '<'} 0",
+                f"{name} holds where {ratio} is {'positive' if sign > 0 else 'negative'}",
+            )
+            for name, ratio, sign in sign_conditions(regrouping)
+        ],
         "packed": packed(list(regrouping.names)),
         "paths": paths,
         "path_constants": constants_of(robot, _symbols(row for rows in closure.row.values() for row in rows.values())),

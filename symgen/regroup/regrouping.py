@@ -210,3 +210,23 @@ def simplified(e: Expression) -> Expression:
                     if e.terms.get(key) == value:
                         return simplified(e - cosine - partner + shorter)
     return e
+
+
+def sign_conditions(regrouping: Regrouping) -> list[tuple[str, Expression, int]]:
+    """(base parameter, ratio of two rates, sign of it in the robot file) wherever a formula adds frictions of dependent directions.
+
+    sign(KR q1) is sign(KR) sign(q1): FS1 + KR FS2 holds for the sign that KR has in the file.
+    """
+    robot, closure = regrouping.robot, close(regrouping.robot)
+    leads: dict[str, Expression] = {}
+    for name, (e, j) in element_names(robot).items():
+        if (e.kind == "coulomb" or e.when is not None) and j in e.along and (row := closure.in_independent(e.along[j])):
+            leads[name] = row[0][1]
+    conditions: dict[Expression, tuple[str, Expression, int]] = {}
+    for b in regrouping.base:
+        for name in b.combination:
+            if name != b.own and name in leads and b.own in leads:
+                ratio = leads[name] * leads[b.own].inverse()
+                if ratio.symbols:
+                    conditions.setdefault(ratio, (b.name, ratio, 1 if ratio.value(robot.constants) > 0 else -1))
+    return list(conditions.values())
