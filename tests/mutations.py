@@ -82,7 +82,7 @@ FAULTS = (
 
 
 def caught_by(fault: Fault, copy: Path) -> str:
-    """The first test that fails with the fault in the copy; empty where all pass."""
+    """The first test that fails with the fault in the copy, and passes without it; empty where all pass."""
     path = copy / fault.file
     right = path.read_text(encoding="utf-8")
     if right.count(fault.old) != 1:
@@ -90,15 +90,23 @@ def caught_by(fault: Fault, copy: Path) -> str:
     path.write_text(right.replace(fault.old, fault.new), encoding="utf-8")
     forget(path)
     try:
-        environment = {**os.environ, "PYTHONPATH": str(copy), "SYMGEN_CACHE": str(copy / "cache"), "MPLBACKEND": "Agg"}
-        tests = [str(Path("tests") / name) for name in fault.tests]
-        command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-p", "no:cacheprovider", *tests]
-        done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, timeout=600, check=False)
+        done = tested(copy, [str(Path("tests") / name) for name in fault.tests])
     finally:
         path.write_text(right, encoding="utf-8")
         forget(path)
-    found = re.search(r"^(?:FAILED|ERROR) (?:tests/)?(\S+)", done.stdout, re.MULTILINE)
-    return found[1] if found else "" if done.returncode == 0 else f"? pytest ended with {done.returncode}: {done.stdout[-300:]}"
+    found = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+    if not found:
+        return "" if done.returncode == 0 else f"? pytest ended with {done.returncode}: {done.stdout[-300:]}"
+    if tested(copy, [found[1]]).returncode != 0:
+        return f"? {found[1]} fails without the fault, too"
+    return found[1].removeprefix("tests/")
+
+
+def tested(copy: Path, tests: list[str]) -> subprocess.CompletedProcess[str]:
+    """A run of pytest in the copy, up to the first failure."""
+    environment = {**os.environ, "PYTHONPATH": str(copy), "SYMGEN_CACHE": str(copy / "cache"), "MPLBACKEND": "Agg"}
+    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-p", "no:cacheprovider", *tests]
+    return subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, timeout=600, check=False)
 
 
 def forget(path: Path) -> None:
