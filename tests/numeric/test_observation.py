@@ -58,6 +58,17 @@ def test_plain_recipe(record):
     assert o.W.flags.f_contiguous
 
 
+def test_a_spike_of_a_torque_is_no_measurement(record):
+    """One sample far off: the median filter takes it out, and without the filter Y shows it."""
+    tau = record.tau.copy()
+    tau[3000, 1] += 1e3
+    spiked = Record(T, record.q, tau, rate=RATE)
+    difference = [
+        np.abs(observe(planar, spiked, s).Y - observe(planar, record, s).Y).max() for s in (study(signals={"median": 3}), study())
+    ]
+    assert difference[0] < 1e-2 * np.abs(record.tau).max() and difference[1] > 10
+
+
 def test_zero_entries_stay_zero(record):
     o = observe(planar, record, study())
     for j in range(2):
