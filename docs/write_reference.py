@@ -42,8 +42,10 @@ def filled(text: str) -> str:
 
 
 def tidy(text: str) -> str:
-    """Without blanks at the ends of lines, and without more than one empty line in a row."""
-    return re.sub(r"\n{3,}", "\n\n", re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)).strip() + "\n"
+    """Without blanks at the ends of lines and, outside of code, without more than one empty line in a row."""
+    text = re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)
+    parts = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
+    return "".join(part if k % 2 else re.sub(r"\n{3,}", "\n\n", part) for k, part in enumerate(parts)).strip() + "\n"
 
 
 def pages() -> Iterator[tuple[Path, str]]:

@@ -156,12 +156,18 @@ def test_no_two_modules_import_each_other_by_any_way() -> None:
 
 
 def test_files_are_of_a_readable_length() -> None:
-    assert {p.as_posix(): n for p in FILES if p.parts[0] != "generated" and (n := len((ROOT / p).read_text(encoding="utf-8").splitlines())) > 400} == {}
+    assert {
+        p.as_posix(): n
+        for p in FILES
+        if p.parts[0] != "generated" and (n := len((ROOT / p).read_text(encoding="utf-8").splitlines())) > 400
+    } == {}
 
 
 def test_nothing_runs_text_as_code() -> None:
     for name in MODULES:
-        called = {n.func.id if isinstance(n.func, ast.Name) else n.func.attr for n in calls(name) if isinstance(n.func, ast.Name | ast.Attribute)}
+        called = {
+            n.func.id if isinstance(n.func, ast.Name) else n.func.attr for n in calls(name) if isinstance(n.func, ast.Name | ast.Attribute)
+        }
         builtins = {n.func.id for n in calls(name) if isinstance(n.func, ast.Name)}
         assert not builtins & FORBIDDEN_CALLS and not called & {"sympify", "parse_expr"}, name
         assert not {m.split(".")[0] for m in imports(name)} & {"pickle", "marshal", "shelve", "dill", "cloudpickle"}, name
@@ -173,7 +179,7 @@ LIBRARIES = {"np", "numpy", "yaml", "ruamel", "torch", "joblib", "pandas", "pl"}
 
 def test_nothing_is_unpickled() -> None:
     """No library turns a file into objects by running what it holds: numpy.load says allow_pickle=False, YAML makes plain data."""
-    for name, call in ((name, call) for name in MODULES for call in calls(name)):
+    for name, call in ((module, call) for module in MODULES for call in calls(module)):
         said = {k.arg: k.value.value for k in call.keywords if isinstance(k.value, ast.Constant)}
         called, place = ast.unparse(call.func), f"{name}, line {call.lineno}"
         if called.rpartition(".")[2] in READERS and called.partition(".")[0] in LIBRARIES:
