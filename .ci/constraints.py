@@ -1,7 +1,10 @@
 """Versions of everything that `pip install '.[test]'` brings, as installed in this environment: `python .ci/constraints.py > constraints.txt`."""
 
 import re
+import tomllib
+from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
 from platform import python_version
 
 
@@ -9,24 +12,26 @@ def normal(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def needed(name: str, extras: frozenset[str], found: dict[str, str]) -> None:
-    """Adds the distribution and what it requires, where that is installed."""
-    try:
-        of = distribution(name)
-    except PackageNotFoundError:
-        return
-    found[normal(name)] = of.version
-    for text in of.requires or ():
+def needed(requirements: Iterable[str], extras: frozenset[str], found: dict[str, str]) -> None:
+    """Adds the distributions of these requirements and what they require, where that is installed."""
+    for text in requirements:
         requirement, _, marker = text.partition(";")
         extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)", marker)
-        inner = normal(re.split(r"[\s<>=!~\[(]", requirement.strip(), maxsplit=1)[0])
-        if (extra is None or extra[1] in extras) and inner not in found:
-            asked = re.search(r"\[([^\]]*)\]", requirement)
-            needed(inner, frozenset(asked[1].split(",")) if asked else frozenset(), found)
+        name = normal(re.split(r"[\s<>=!~\[(]", requirement.strip(), maxsplit=1)[0])
+        if (extra is not None and extra[1] not in extras) or name in found:
+            continue
+        try:
+            of = distribution(name)
+        except PackageNotFoundError:
+            continue
+        found[name] = of.version
+        asked = re.search(r"\[([^\]]*)\]", requirement)
+        needed(of.requires or (), frozenset(asked[1].split(",")) if asked else frozenset(), found)
 
 
+project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 versions: dict[str, str] = {}
-needed("symgen", frozenset({"test"}), versions)
+needed([*project["dependencies"], *project["optional-dependencies"]["test"]], frozenset(), versions)
 for own in ("symgen", "setuptools", "pip"):
     versions.pop(own, None)
 print(
