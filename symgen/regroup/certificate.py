@@ -27,7 +27,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symgen.derive.exact import Array, Draw, Fp, primes_for, units_of
+from symgen.derive.angles import primes_for, units_of
+from symgen.derive.exact import Array, Draw, Fp
 from symgen.derive.loops import close
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot

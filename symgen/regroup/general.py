@@ -26,8 +26,9 @@ from typing import Any
 
 import numpy as np
 
+from symgen.derive.angles import Variable, primes_for
 from symgen.derive.columns import columns, element_names, inertial_names
-from symgen.derive.exact import Array, Draw, Fp, Variable, power, primes_for
+from symgen.derive.exact import Array, Draw, Fp, power
 from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
 from symgen.derive.loop_equations import loop_system, residuals

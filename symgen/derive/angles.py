@@ -1,0 +1,170 @@
+"""Fixed angles and square roots of a robot over F_p: the unit angles, the radicands, and the primes in which all of them exist.
+
+Fractions of pi with a moderate denominator are whole multiples of pi/D, a root of unity of F_p. Every other fixed angle is a whole multiple of a
+unit that is drawn at random: radians and multiples of constants (transcendental against all algebraic numbers), and fractions of pi with a
+large denominator, whose minimal polynomial has a degree of the order of that denominator. Multiples are at most LARGEST_MULTIPLE, so that
+degrees stay small against p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import lru_cache
+from itertools import combinations, product
+from math import gcd, lcm
+
+import numpy as np
+
+from symgen.description.expression import Call, Expression, Monomial, Number, quarter_turns
+from symgen.description.robot import REVOLUTE, Robot
+
+PI: Monomial = (("pi", 1),)
+LARGEST_RADICAND = 100  # roots of larger primes are drawn by themselves: their fields share nothing with angles of small denominator
+LARGEST_DENOMINATOR, LARGEST_ORDER = 360, 100_000  # of a fraction of pi, and of all of them together
+LARGEST_MULTIPLE = 16  # of a unit angle
+Unit = tuple[Monomial, Fraction]  # the angle fraction * monomial
+Variable = str | Number | Call | Unit  # what a geometry may give: a constant, "pi", a number, a square root, a unit angle
+
+
+def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
+    """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and the leading sign positive."""
+    angles: dict[Expression, None] = {}
+    for e in _angles(robot):
+        rest = quarter_turns(e)[1]
+        if rest and -rest not in angles:
+            angles[rest] = None
+    return tuple(angles)
+
+
+class Units:
+    """The unit angles of a robot: `of` writes a fixed angle as a sum of whole multiples of them.
+
+    pi/D is the first, D the common denominator of its moderate fractions of pi and of those that its square roots need.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.D = 2
+        for l in radicands(robot):
+            self.D = lcm(self.D, 4 if l == 2 else l if l < LARGEST_RADICAND else 1)
+        self.free: dict[Monomial, list[Fraction]] = {}
+        angles = fixed_angles(robot)
+        for c in sorted({e.terms.get(PI, Fraction(0)) for e in angles}, key=lambda c: c.denominator):
+            if c.denominator <= LARGEST_DENOMINATOR and lcm(self.D, c.denominator) <= LARGEST_ORDER:
+                self.D = lcm(self.D, c.denominator)
+        amounts: dict[Monomial, list[Fraction]] = {}
+        for e in angles:
+            for m, c in e.terms.items():
+                if m != PI:
+                    amounts.setdefault(m, []).append(abs(c))
+        for m, found in amounts.items():
+            common = lcm(*(c.denominator for c in found))
+            unit = Fraction(gcd(*(int(c * common) for c in found)), common)
+            if max(found) / unit <= LARGEST_MULTIPLE:
+                self.free[m] = [unit]
+        for e in angles:
+            self.of(e)
+
+    @property
+    def all(self) -> list[Unit]:
+        """pi/D, then the free ones."""
+        return [(PI, Fraction(1, self.D)), *((m, c) for m, found in self.free.items() for c in found)]
+
+    def of(self, angle: Expression) -> list[tuple[Unit, int]]:
+        """[(unit, whole multiple)]; an amount that is no small multiple of known units becomes a unit."""
+        return [(unit, k) for m, c in angle.terms.items() for unit, k in self._multiples(m, c)]
+
+    def _multiples(self, m: Monomial, c: Fraction) -> list[tuple[Unit, int]]:
+        turns = [((PI, Fraction(1, self.D)), int(c * self.D))]
+        if m == PI and (c * self.D).denominator == 1:
+            return turns
+        free = self.free.setdefault(m, [])
+        small = [k for n in range(1, LARGEST_MULTIPLE + 1) for k in (n, -n)]
+        for unit, k in product(free, small):
+            rest = (c - k * unit) * self.D
+            if rest == 0:
+                return [((m, unit), k)]
+            if m == PI and rest.denominator == 1:
+                return [((m, unit), k), ((PI, Fraction(1, self.D)), int(rest))]
+        for (u, v), k, n in product(combinations(free, 2), small[:8], small[:8]):
+            rest = (c - k * u - n * v) * self.D
+            if rest == 0 or (m == PI and rest.denominator == 1):
+                return [((m, u), k), ((m, v), n), *([((PI, Fraction(1, self.D)), int(rest))] if rest else [])]
+        free.append(abs(c))
+        return [((m, abs(c)), 1 if c > 0 else -1)]
+
+
+@lru_cache(maxsize=64)
+def units_of(robot: Robot) -> Units:
+    """The unit angles of `robot`."""
+    return Units(robot)
+
+
+def _angles(robot: Robot) -> Iterator[Expression]:
+    for f in robot.frames:
+        yield from (f.gamma, f.alpha, f.theta0)
+    joints = {f"q{i}": Expression() for i in robot.moving}
+    for j, e in robot.constraints.items():
+        if robot.frame(j).sigma == REVOLUTE:
+            yield e.substitute(joints)
+    yield from (a.argument for a in _calls(robot) if a.function in ("cos", "sin"))
+
+
+def _calls(robot: Robot) -> Iterator[Call]:
+    """Functions in lengths, gravity and the rows of elements."""
+    lengths = [e for f in robot.frames for e in (f.b, f.d, f.r0)]
+    rows = [c for e in robot.elements for table in (e.along, e.form) for row in table.values() for c in row.values()]
+    pending = [*robot.gravity, *lengths, *rows, *robot.constraints.values()]
+    while pending:
+        for a in pending.pop().atoms:
+            if isinstance(a, Call):
+                yield a
+                pending.append(a.argument)
+
+
+def radicands(robot: Robot) -> tuple[int, ...]:
+    """The whole numbers under square roots: primes, and what no small prime divides."""
+    arguments = {a.argument.constant for a in _calls(robot) if a.function == "sqrt"}
+    return tuple(sorted({int(c) for c in arguments if c is not None}))
+
+
+def roots_of(robot: Robot) -> tuple[Call, ...]:
+    """The square roots in lengths, gravity, ratios and rows of elements."""
+    return tuple(dict.fromkeys(a for a in _calls(robot) if a.function == "sqrt"))
+
+
+@lru_cache
+def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
+    """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, in which the radicands are squares: the largest, or below a random place."""
+    step = lcm(4, 2 * units_of(robot).D)
+    top = 2**31 if seed is None else int(np.random.default_rng(seed).integers(2**30, 2**31))
+    squares = [c for c in radicands(robot) if c >= LARGEST_RADICAND]
+    p = top // step * step - 1
+    found: list[int] = []
+    while len(found) < count:
+        if p < 2**20:
+            raise ArithmeticError(f"no prime below 2**31 for angles pi/{step // 2} and the square roots of {squares}")
+        if _is_prime(p) and all(pow(c, (p - 1) // 2, p) == 1 for c in squares):
+            found.append(p)
+        p -= step
+    return tuple(found)
+
+
+def _is_prime(n: int) -> bool:
+    """Miller-Rabin with bases 2, 3, 5, 7: exact below 3.2e9."""
+    if n < 2 or any(n % b == 0 for b in (2, 3, 5, 7) if n != b):
+        return False
+    d, s = n - 1, 0
+    while d % 2 == 0:
+        d, s = d // 2, s + 1
+    for base in (2, 3, 5, 7):
+        x = pow(base, d, n)
+        if x in (1, n - 1):
+            continue
+        for _ in range(s - 1):
+            x = x * x % n
+            if x == n - 1:
+                break
+        else:
+            return False
+    return True
