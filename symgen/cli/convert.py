@@ -10,17 +10,22 @@ import typer
 from runtime.result_files import write_all
 from symgen.cli.session import fail, reported_errors
 
+LARGEST_SNAP = 0.1  # rad
+
 
 def convert(
     source: Annotated[str, typer.Argument(metavar="IN", help="Packaged robot, or a file: .yaml, .par, .urdf, .xml or .mjcf (MJCF).")],
     output: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; its suffix names the format: .yaml, .par, .urdf.")],
     constant: Annotated[list[str] | None, typer.Option(help="Value of a symbol of a .par file, D3=0.45 (SI, rad); repeat.")] = None,
     snap: Annotated[
-        float,
-        typer.Option(
-            min=0, max=0.1, help="Angles of a URDF this close (rad) to a multiple of pi/12 become that: 1e-4 reads 1.5708 as pi/2."
-        ),
-    ] = 0.0,
+        str,
+        typer.Option(help="Angles of a URDF this close (rad) to a multiple of pi/12 become that; auto is 1e-4, 0 takes them as they are."),
+    ] = "auto",
+    lock: Annotated[list[str] | None, typer.Option(help="Of a URDF or MJCF: hold a joint, elbow=pi/2 (rad or m); repeat.")] = None,
+    chain: Annotated[
+        tuple[str, str] | None,
+        typer.Option(metavar="BASE TIP", help="Of a URDF or MJCF: the joints between two links alone; others are held at zero."),
+    ] = None,
     keep_fixed: Annotated[
         bool, typer.Option("--keep-fixed", help="Of a URDF or MJCF: links that fixed joints hold (tool0, flange) are frames of their own.")
     ] = False,
@@ -38,12 +43,20 @@ def convert(
     OUT is written whole or not at all; where the target would hold another mechanism nothing is written, exit code 2.
     """
     with reported_errors():
-        from symgen.description.files import read_robot, write_robot
+        from symgen.description.files import SNAP, read_robot, write_robot
+        from symgen.description.urdf import REMARKS
         from symgen.description.values import assignment, values_of_csv, with_estimate, with_values
 
         if output.exists() and not force:
             fail(f"{output} exists already; choose another name or add --force")
-        robot, read = read_robot(source, constants=dict(map(assignment, constant or ())), nearly=snap, keep_fixed=keep_fixed)
+        robot, read = read_robot(
+            source,
+            constants=dict(map(assignment, constant or ())),
+            nearly=SNAP if snap == "auto" else _angle(snap),
+            keep_fixed=keep_fixed,
+            lock=dict(assignment(text, "--lock") for text in lock or ()),
+            chain=chain,
+        )
         if values is not None:
             from runtime.files import read_bytes
 
@@ -55,6 +68,18 @@ def convert(
         text, written = write_robot(robot, output.name, comments=[f"Converted from {robot.file}.", *read])
         write_all(output.parent, {output.name: text})
         typer.echo(f"{output}: {robot.name}, {len(robot.joints)} joints, {len(robot.parameters)} standard parameters")
-        for head, notes in ((f"read from {source}", read), (f"not carried by {output.name}", written)):
+        remarks = [note for note in read if note.startswith(REMARKS)]
+        others = [note for note in read if note not in remarks]
+        for head, notes in ((f"read from {source}", others), (f"not carried by {output.name}", written), (f"of {source}", remarks)):
             if notes:
-                typer.echo("\n".join([f"{head}:", *(f"  - {note}" for note in notes)]))
+                typer.echo("\n".join([f"{head}:", *(f"  - {note}" for note in notes)]), err=notes is remarks)
+
+
+def _angle(text: str) -> float:
+    try:
+        angle = float(text)
+    except ValueError:
+        angle = -1.0
+    if not 0 <= angle <= LARGEST_SNAP:
+        fail(f"--snap {text[:40]}; expected auto, 0, or an angle up to {LARGEST_SNAP} rad")
+    return angle

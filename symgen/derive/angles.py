@@ -48,6 +48,7 @@ class Units:
         for l in radicands(robot):
             self.D = lcm(self.D, 4 if l == 2 else l if l < LARGEST_RADICAND else 1)
         self.free: dict[Monomial, list[Fraction]] = {}
+        self.sums: dict[tuple[Monomial, Fraction], list[tuple[Unit, int]]] = {}
         angles = fixed_angles(robot)
         for c in sorted({e.terms.get(PI, Fraction(0)) for e in angles}, key=lambda c: c.denominator):
             if c.denominator <= LARGEST_DENOMINATOR and lcm(self.D, c.denominator) <= LARGEST_ORDER:
@@ -64,6 +65,25 @@ class Units:
                 self.free[m] = [unit]
         for e in angles:
             self.of(e)
+        self._add_sums(robot)
+
+    def _add_sums(self, robot: Robot) -> None:
+        """Sums of the angles about parallel axes in a row are those sums, not new units (`Geometry` turns by them at once)."""
+        angles: dict[int, tuple[Expression, ...]] = {}
+        for f in robot.frames:
+            following = robot.constraints.get(f.j) if f.sigma == REVOLUTE else None
+            constant = Expression() if following is None else following.substitute({f"q{i}": Expression() for i in robot.moving})
+            parallel = not f.alpha
+            before = angles.get(f.ant, ()) if parallel else ()
+            angles[f.j] = (*before, f.theta0 + constant + (f.gamma if parallel else Expression()))
+            total = sum(angles[f.j], Expression())
+            for m, c in total.terms.items() if before else ():
+                if m != PI and (m, c) not in self.sums:
+                    parts = [self._multiples(m, e.terms[m]) for e in angles[f.j] if m in e.terms]
+                    whole: dict[Unit, int] = {}
+                    for unit, k in (pair for part in parts for pair in part):
+                        whole[unit] = whole.get(unit, 0) + k
+                    self.sums |= {(m, sign * c): [(unit, sign * k) for unit, k in whole.items() if k] for sign in (1, -1)}
 
     @property
     def all(self) -> list[Unit]:
@@ -78,6 +98,8 @@ class Units:
         turns = [((PI, Fraction(1, self.D)), int(c * self.D))]
         if m == PI and (c * self.D).denominator == 1:
             return turns
+        if (m, c) in self.sums:
+            return self.sums[m, c]
         free = self.free.setdefault(m, [])
         small = [k for n in range(1, LARGEST_MULTIPLE + 1) for k in (n, -n)]
         for unit, k in product(free, small):

@@ -13,7 +13,9 @@ from symgen.description.yaml import parse_robot
 from symgen.description.yaml_write import write_yaml
 from symgen.errors import DescriptionError
 
+TREES = (".urdf", ".xml", ".mjcf")  # suffixes of the formats of links and joints by name
 WRITTEN = (".yaml", ".yml", ".par", ".urdf")  # suffixes of the formats that are written
+SNAP = 1e-4  # rad: roll, pitch and yaw of a URDF this close to a multiple of pi/12 are taken as that
 MAX_BYTES = 10_000_000  # no format reads more; each has a limit of its own below
 
 
@@ -30,7 +32,7 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False) -> Robot:
     ----------
     source : str or Path
         Name of a packaged robot (`tx40`), or path of a robot file (`arm.yaml`, `./tx40`), a `.par` file, a URDF (`.urdf`) or an MJCF
-        (`.xml`, `.mjcf`; extra `mjcf`).
+        (`.xml`, `.mjcf`; extra `mjcf`). Angles of a URDF within SNAP of a multiple of pi/12 are taken as that.
     keep_fixed : bool
         Of a URDF or MJCF: links that fixed joints hold are fixed frames of their own, as by `read_urdf`.
 
@@ -48,7 +50,13 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False) -> Robot:
 
 
 def read_robot(
-    source: str | Path, *, constants: Mapping[str, float] | None = None, nearly: float = 0.0, keep_fixed: bool = False
+    source: str | Path,
+    *,
+    constants: Mapping[str, float] | None = None,
+    nearly: float = SNAP,
+    keep_fixed: bool = False,
+    lock: Mapping[str, float] | None = None,
+    chain: tuple[str, str] | None = None,
 ) -> tuple[Robot, tuple[str, ...]]:
     """The robot of a file as by `load_robot`, and notes on what of a foreign format was read otherwise than written, or not at all.
 
@@ -59,28 +67,40 @@ def read_robot(
     constants : mapping, SI and rad
         Values of the symbols of a `.par` file, which has no place for them.
     nearly : float, rad
-        As of `read_urdf`.
+        As of `read_urdf`; 0 takes the file as it is.
+    lock : mapping, rad or m
+        Of a URDF or MJCF: joints that are held, by name, and where.
+    chain : tuple of str
+        Of a URDF or MJCF: links between which joints move, base and tip; the other joints outward of the base are held at zero.
 
     Raises
     ------
     DescriptionError
-        As by `load_robot`.
+        As by `load_robot`; `lock` or `chain` of another format, or of a joint or link that the file does not have.
     """
+    suffix = "" if source in packaged_robots() else Path(source).suffix.lower()
+    if (lock or chain) and suffix not in TREES:
+        raise DescriptionError(
+            f"{source}: joints are locked and chains cut out of {', '.join(TREES)}; edit the frames of this file instead"
+        )
     if source in packaged_robots():
         file = f"{source}.yaml"
         return parse_robot((resources.files("symgen.description") / "robots" / file).read_bytes(), file), ()
     path = Path(source)
     content = _read(path)
-    if path.suffix.lower() == ".par":
+    if suffix == ".par":
         return read_par(content, path.name, constants)
-    if path.suffix.lower() == ".urdf":
-        from symgen.description.urdf import read_urdf  # numpy, which robot files do without
+    if suffix in TREES:
+        from symgen.description.tree_parts import Part  # numpy, which robot files do without
 
-        return read_urdf(content, path.name, nearly=nearly, keep_fixed=keep_fixed)
-    if path.suffix.lower() in (".xml", ".mjcf"):
+        part = Part(lock or {}, chain)
+        if suffix == ".urdf":
+            from symgen.description.urdf import read_urdf
+
+            return read_urdf(content, path.name, nearly=nearly, keep_fixed=keep_fixed, part=part)
         from symgen.description.mjcf import read_mjcf  # mujoco, an extra
 
-        return read_mjcf(content, path.name, keep_fixed=keep_fixed)
+        return read_mjcf(content, path.name, keep_fixed=keep_fixed, part=part)
     return parse_robot(content, path.name), ()
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from symgen.description.mjcf_text import Mjcf, reduced
 from symgen.description.robot import Robot
 from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, Array, Inertial, Joint, Relation, Tree
+from symgen.description.tree_parts import NO_PART, Part, part_of
 from symgen.description.tree_robot import robot_of_tree
 from symgen.description.xml_text import LARGEST
 from symgen.errors import DescriptionError
@@ -31,7 +32,7 @@ _Row = dict[int, Fraction]  # {joint: coefficient}
 _Solved = tuple[_Row, Fraction]  # a row and a constant
 
 
-def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False) -> tuple[Robot, tuple[str, ...]]:
+def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False, part: Part = NO_PART) -> tuple[Robot, tuple[str, ...]]:
     """The robot of an MJCF file, and notes: which joint is which q, which body or site is which kept frame, and what was not read.
 
     Parameters
@@ -43,6 +44,8 @@ def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False) -> tuple[R
     keep_fixed : bool
         Bodies without joints, and sites, are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else such bodies are
         only part of the body that holds them, and sites are left out. Their inertia belongs to that body either way.
+    part : Part
+        Joints held at a position, and the chain that is kept.
 
     Raises
     ------
@@ -51,7 +54,7 @@ def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False) -> tuple[R
     """
     try:
         mjcf = reduced(content)
-        tree = _tree(_compiled(mjcf), mjcf, sites=keep_fixed)
+        tree = part_of(_tree(_compiled(mjcf), mjcf, sites=keep_fixed), part)
         return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
     except DescriptionError as error:
         raise DescriptionError(error.message, path=error.path, file=file, line=error.line or 1) from error.__cause__

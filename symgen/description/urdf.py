@@ -9,22 +9,35 @@ from __future__ import annotations
 import hashlib
 import math
 import sys
+from collections import Counter
+from collections.abc import Iterator
 from fractions import Fraction
 
 import numpy as np
 
-from symgen.description.expression import twelfths
+from symgen.description.expression import PI, twelfths
 from symgen.description.robot import Robot
 from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, MOVING, Inertial, Joint, Relation, Tree, turn
+from symgen.description.tree_frames import SAME
+from symgen.description.tree_parts import NO_PART, Part, part_of
 from symgen.description.tree_robot import robot_of_tree
 from symgen.description.xml_text import LARGEST, Array, Element, read_elements
 from symgen.errors import DescriptionError
 
 Mimic = tuple[str, float, float]  # joint, multiplier, offset
+SNAPPED, DROPPED = "snapped:", "not read:"  # how notes start that tell of a changed angle, of elements left out
+REMARKS = (SNAPPED, DROPPED)
+READ = {  # children of an element that are read, and <material>, which says nothing that is left out
+    "robot": {"link", "joint", "material"},
+    "link": {"inertial"},
+    "joint": {"parent", "child", "origin", "axis", "limit", "dynamics", "mimic"},
+}
 
 
-def read_urdf(content: bytes, file: str, *, nearly: float = 0.0, keep_fixed: bool = False) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of a URDF, and notes: which joint is which q, which link is which kept frame, and what was not read.
+def read_urdf(
+    content: bytes, file: str, *, nearly: float = 0.0, keep_fixed: bool = False, part: Part = NO_PART
+) -> tuple[Robot, tuple[str, ...]]:
+    """The robot of a URDF, and notes: which joint is which q, which link is which kept frame, which angle was changed, what was not read.
 
     Parameters
     ----------
@@ -37,6 +50,8 @@ def read_urdf(content: bytes, file: str, *, nearly: float = 0.0, keep_fixed: boo
     keep_fixed : bool
         Links held by fixed joints (tool0, flange) are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else they
         are only part of the body that holds them. Their inertia belongs to that body either way.
+    part : Part
+        Joints held at a position, and the chain that is kept.
 
     Raises
     ------
@@ -44,7 +59,8 @@ def read_urdf(content: bytes, file: str, *, nearly: float = 0.0, keep_fixed: boo
         No URDF, or no tree of revolute, prismatic and fixed joints; the message names file and line.
     """
     try:
-        return robot_of_tree(parse_urdf(content, nearly), file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
+        tree = part_of(parse_urdf(content, nearly), part)
+        return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
     except DescriptionError as error:
         raise DescriptionError(error.message, path=error.path, file=file, line=error.line or 1) from error.__cause__
 
@@ -69,11 +85,29 @@ def parse_urdf(content: bytes, nearly: float = 0.0) -> Tree:
     if len(joints) > MAX_JOINTS:
         raise DescriptionError(f"{len(joints)} joints; at most {MAX_JOINTS} are read", line=root.line)
     base = _root(links, joints, root.line)
-    other = sorted({e.tag for e in root.children} - {"link", "joint", "material"})
-    notes: tuple[str, ...] = (f"not read: {', '.join(f'<{tag}>' for tag in other)}",) if other else ()
+    other = Counter(_left_out(root))
+    notes: tuple[str, ...] = (f"{DROPPED} {', '.join(f'{other[tag]} <{tag:.40}>' for tag in sorted(other))}",) if other else ()
+    notes += tuple(_changes(root, nearly))
     points = [e.text("name") for e in root.children if e.tag == "link" and (own := e.first("inertial")) and own.first("inertia") is None]
     notes += (f"no <inertia>, taken as point masses: {', '.join(f'{name!a:.60}' for name in points)}",) if points else ()
     return Tree(root.attributes.get("name", ""), links, tuple(joints), base, _relations(joints, mimics), notes=notes)
+
+
+def _left_out(root: Element) -> Iterator[str]:
+    """Tags of the elements of a robot, its links and its joints that are not read."""
+    for e in (root, *root.children):
+        yield from (child.tag for child in e.children if e.tag in READ and child.tag not in READ[e.tag])
+
+
+def _changes(root: Element, nearly: float) -> Iterator[str]:
+    """A sentence for each angle that `snapped` changes by more than rounding: of which joint or link, from what, to what."""
+    for e in root.children:
+        holder = e.first("inertial") if e.tag == "link" else e
+        origin = holder.first("origin") if holder is not None and e.tag in ("link", "joint") else None
+        for name, x in zip(("roll", "pitch", "yaw"), origin.numbers("rpy", 3, "0 0 0") if origin else (), strict=False):
+            k = twelfths(x, nearly)
+            if k is not None and abs(change := k * (math.pi / 12) - x) > SAME:
+                yield f"{SNAPPED} {name} of {e.tag} {e.text('name')!a:.60} (line {origin.line if origin else e.line}) from {x:.12g} to {PI * Fraction(k, 12)}, by {change:.1e} rad"
 
 
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Relation]:

@@ -12,15 +12,15 @@ from symgen.description.robot import Robot
 from symgen.errors import DescriptionError
 
 
-def assignment(text: str) -> tuple[str, float]:
-    """Name and number of NAME=NUMBER, the number a constant expression. Raises DescriptionError or ExpressionError."""
-    name, equals, value = text.partition("=")
+def assignment(text: str, option: str = "--constant") -> tuple[str, float]:
+    """Name and number of NAME=NUMBER, as `option` takes them, the number a constant expression. Raises DescriptionError or ExpressionError."""
+    name, equals, value = text.rpartition("=")
     try:
         if name.strip() and equals:
             return name.strip(), float(parse(value, ()))
     except (ValueError, ZeroDivisionError, OverflowError):
         pass
-    raise DescriptionError(f"--constant {text}; expected NAME=NUMBER")
+    raise DescriptionError(f"{option} {text}; expected NAME=NUMBER")
 
 
 def values_of_csv(content: bytes, file: str) -> dict[str, float]:

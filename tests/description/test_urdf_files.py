@@ -37,7 +37,7 @@ def error_of(text):
 def test_what_is_not_read_is_noted():
     robot, notes = read_urdf(ARM.encode(), "arm.urdf")
     assert robot.name == "my_arm" and [f.sigma for f in robot.frames] == [0, 1]
-    assert notes[0] == "joints: q1 = 's', q2 = 'e'" and "<gazebo>, <transmission>" in notes[1]
+    assert notes[0] == "joints: q1 = 's', q2 = 'e'" and notes[1] == "not read: 1 <gazebo>, 1 <transmission>, 1 <visual>"
     assert any("values of link 2 are 0" in note for note in notes) and robot.values["ZZ1"] == 1 and robot.values["M2"] == 0
 
 
