@@ -39,7 +39,7 @@ from runtime.identification.friction_laws import (
     percent,
 )
 from runtime.identification.residuals import correlation_time, residual_correlation
-from runtime.model.generated import GeneratedModel, require
+from runtime.model.generated import GeneratedModel, elements_of, require
 from runtime.model.inertia import physical_model
 from runtime.observation.filters import decimated, filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states
@@ -167,7 +167,7 @@ def friction_curves(model: GeneratedModel, records: Sequence[Record], study: Stu
 def own_friction(model: GeneratedModel, j: int) -> list[int]:
     """Base parameters made of friction and offset of joint number j alone (j from 0), those of its curve."""
     physical = physical_model(model)
-    elements: Mapping[str, Any] = cast(Any, model).ELEMENTS
+    elements = elements_of(model)
     own = [name in elements and elements[name][0] in OWN for name in physical.standard]
     structure = np.asarray(model.STRUCTURE)
     alone = structure[:, j] & (structure.sum(axis=1) == 1)

@@ -25,7 +25,7 @@ from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.methods import estimate_of
 from runtime.estimators.solution import Solution, solve
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, elements_of
 from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
 from runtime.model.mount import Mount, load_vector, mount
 from runtime.observation.observation import Observation, stack
@@ -158,7 +158,7 @@ def payload_difference(model: GeneratedModel, without: Estimate, loaded: Estimat
 
 def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int]:
     """Base parameters that are made of viscous and Coulomb friction alone."""
-    elements: Mapping[str, Any] = model.ELEMENTS  # type: ignore[attr-defined]
+    elements = elements_of(model)
     friction = np.array([name in elements and elements[name][0] in FRICTION for name in physical.standard])
     return [k for k, row in enumerate(physical.K) if not row[~friction].any()]
 

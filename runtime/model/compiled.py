@@ -12,11 +12,11 @@ from __future__ import annotations
 import ctypes
 import os
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -38,15 +38,6 @@ STATES = {
 }
 
 
-class DynamicModel(GeneratedModel, Protocol):
-    """A generated model with the dynamics that C replaces."""
-
-    inverse_dynamics: Callable[..., Array]
-    inertia_matrix: Callable[..., Array]
-    bias: Callable[..., Array]
-    gravity: Callable[..., Array]
-
-
 def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None) -> GeneratedModel:
     """`model` with its functions in C, or `model` itself, with a FallbackWarning saying why, where that cannot be had.
 
@@ -62,7 +53,7 @@ def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: 
         path = source or _beside(model)
         text = _text(path)
         library = shared_object(path, text, cache or cache_folder(), lambda opened: _opened(opened, model))
-        compiled = CompiledModel(cast(DynamicModel, model), library, text)
+        compiled = CompiledModel(model, library, text)
         compiled.check()
         return cast(GeneratedModel, compiled)
     except (NotCompiledError, OSError) as e:
@@ -106,23 +97,18 @@ class SignalTable:
 
 
 class CompiledModel:
-    """The API of the generated module; what the C file lacks is that of the module. `signals`: for other C code. `source`: the C file's text."""
+    """The API of the generated module; what the C file lacks is that of the module. `module`: that module. `signals`: for other C code. `source`: the C file's text."""
 
-    def __init__(self, model: DynamicModel, library: ctypes.CDLL, source: bytes) -> None:
-        self._model, self._library, self.source = model, library, source
+    def __init__(self, model: GeneratedModel, library: ctypes.CDLL, source: bytes) -> None:
+        self.module, self._library, self.source = model, library, source
         self.signals = _signals(library, model)
         self._n, self._b = len(model.JOINTS), len(model.BASE_PARAMETERS)
         self._large = _large()
 
     def __getattr__(self, name: str) -> Any:
-        if name == "_model":  # while it is being copied
+        if name == "module":  # while it is being copied
             raise AttributeError(name)
-        return getattr(self._model, name)
-
-    @property
-    def module(self) -> GeneratedModel:
-        """The NumPy module."""
-        return cast(GeneratedModel, self._model)
+        return getattr(self.module, name)
 
     def regressor(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
         """D, shape (N, n, b): a view on one store of shape (b, n, N)."""
@@ -161,7 +147,7 @@ class CompiledModel:
         X = rng.uniform(-1, 1, self._b)
         for name, used in STATES.items():
             arguments = [*states[: len(used)], *([] if name == "regressor" else [X])]
-            result, expected = (getattr(m, name)(*arguments) for m in (self, self._model))
+            result, expected = (getattr(m, name)(*arguments) for m in (self, self.module))
             if not np.abs(result - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
                 raise NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
 
@@ -169,8 +155,8 @@ class CompiledModel:
         states = self._states("regressor", (q, qd, qdd))
         N = len(states[0])
         if out is None:
-            out = self._model.store(N)
-        elif not (isinstance(out, cast(Any, self._model).Store) and cast(Any, out).ready and out.shape == (self._b, self._n, N)):
+            out = self.module.store(N)
+        elif not (isinstance(out, cast(Any, self.module).Store) and cast(Any, out).ready and out.shape == (self._b, self._n, N)):
             raise ValueError(
                 f"out: expected store({N}) of shape {(self._b, self._n, N)}, found {type(out).__name__} of shape {np.shape(out)}"
             )
@@ -181,7 +167,7 @@ class CompiledModel:
         states = self._states(name, given)
         X = np.ascontiguousarray(X, dtype=float)
         if X.shape != (self._b,):
-            raise InputError(f"{self._model.NAME}: X has shape {X.shape}; expected ({self._b},)")
+            raise InputError(f"{self.module.NAME}: X has shape {X.shape}; expected ({self._b},)")
         result = np.empty((*[self._n] * axes, len(states[0])))
         self._call(name, (*states, X), constants, result)
         result = np.moveaxis(result, -1, 0)
@@ -193,24 +179,24 @@ class CompiledModel:
         for label, x in zip(STATES[name], states, strict=True):
             if x.ndim != 2 or x.shape[1] != self._n or x.shape != states[0].shape:
                 raise InputError(
-                    f"{self._model.NAME}: {label} has shape {x.shape}, q {states[0].shape}; expected (N, {self._n}), the same for all"
+                    f"{self.module.NAME}: {label} has shape {x.shape}, q {states[0].shape}; expected (N, {self._n}), the same for all"
                 )
         return states
 
     def _call(self, name: str, inputs: Sequence[Array], constants: Mapping[str, float], result: Array) -> None:
-        unknown = set(constants) - set(self._model.CONSTANTS)
+        unknown = set(constants) - set(self.module.CONSTANTS)
         if unknown:
             raise TypeError(
-                f"{name}() got unexpected keywords {sorted(unknown)}; constants are {', '.join(self._model.CONSTANTS) or 'none'}"
+                f"{name}() got unexpected keywords {sorted(unknown)}; constants are {', '.join(self.module.CONSTANTS) or 'none'}"
             )
-        values = np.array([float({**self._model.CONSTANTS, **constants}[c]) for c in self._model.CONSTANTS] or [0.0])
+        values = np.array([*{**self.module.CONSTANTS, **constants}.values()] or [0.0], dtype=float)
         if not (result.flags.c_contiguous and result.flags.aligned and result.flags.writeable and result.dtype == np.float64):
-            raise InputError(f"{self._model.NAME}: the store is not a writeable float64 array in C order")
+            raise InputError(f"{self.module.NAME}: the store is not a writeable float64 array in C order")
         stream = result.nbytes > self._large
         pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*inputs, values, result)]
-        status = getattr(self._library, f"{self._model.NAME}_{name}")(ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream))
+        status = getattr(self._library, f"{self.module.NAME}_{name}")(ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream))
         if status:
-            raise InputError(f"{self._model.NAME}: {name} in C refused its arguments with {status}")
+            raise InputError(f"{self.module.NAME}: {name} in C refused its arguments with {status}")
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ module given by path is parsed before it runs (`runtime.model.loading`), so that
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from runtime.errors import InputError, ModelError
+from runtime.errors import InputError, ModelError, SettingsError
 from runtime.model.drives import Drives
 from runtime.model.loading import module_of
 
@@ -30,7 +30,7 @@ FUNCTIONS = ("store", "regressor", "observation_matrix")  # what identification 
 
 
 class GeneratedModel(Protocol):
-    """What `runtime` uses of an emitted module: n joints, b base parameters, q, qd, qdd of shape (N, n)."""
+    """What `runtime` uses of an emitted module: n joints, b base parameters, q, qd, qdd of shape (N, n); `require` checks the dynamics before use."""
 
     NAME: str
     JOINTS: tuple[int, ...]
@@ -41,6 +41,10 @@ class GeneratedModel(Protocol):
     VALUES: Mapping[str, float]
     CONSTANTS: Mapping[str, float]
     SOURCE_SHA256: str
+    inverse_dynamics: Callable[..., Array]  # GAM (N, n) of q, qd, qdd, X
+    inertia_matrix: Callable[..., Array]  # A (N, n, n) of q, X
+    bias: Callable[..., Array]  # GAM (N, n) of q, qd, X
+    gravity: Callable[..., Array]  # GAM (N, n) of q, X
 
     def store(self, N: int) -> Array:
         """Workspace of shape (b, n, N) for `out`, structural zeros written."""
@@ -138,8 +142,9 @@ def checked_model(module: ModuleType) -> GeneratedModel:
     structure = np.asarray(model.STRUCTURE)
     if structure.shape != (b, n) or structure.dtype != np.bool_:
         raise ModelError(f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, n)}, base parameters by joints", file=label)
-    if model.DRIVES is not None and Drives.from_mapping(model.DRIVES).n != n:
-        raise ModelError(f"DRIVES of {len(model.DRIVES['ratio'])} joints; expected {n}", file=label)
+    drives = drives_of(model)
+    if drives is not None and drives.n != n:
+        raise ModelError(f"DRIVES of {drives.n} joints; expected {n}", file=label)
     _check_store(model, b, n, label)
     return model
 
@@ -149,6 +154,47 @@ def require(model: GeneratedModel, *functions: str) -> None:
     missing = [name for name in functions if not callable(getattr(model, name, None))]
     if missing:
         raise ModelError(f"no function {', '.join(missing)}; emit the model again with the target that has them", file=model.NAME)
+
+
+def drives_of(model: GeneratedModel) -> Drives | None:
+    """The drives of a model; None where it has none."""
+    return None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
+
+
+def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[str, float]:
+    """Geometry and gravity in the order of CONSTANTS, `constants` in place of the robot file's; InputError for names that the model does not have."""
+    if unknown := sorted(constants.keys() - model.CONSTANTS.keys()):
+        raise InputError(f"{model.NAME} has no constant {', '.join(unknown)}; there are {', '.join(model.CONSTANTS) or 'none'}")
+    return {**model.CONSTANTS, **constants}
+
+
+def elements_of(model: GeneratedModel, constants: Mapping[str, float] | None = None) -> Mapping[str, Any]:
+    """Elements of a model (friction, inertia, springs): kind, direction of motion, and row or form by joint, of each parameter.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    constants : mapping, optional
+        Values in place of the robot file's.
+
+    Raises
+    ------
+    ModelError
+        A model of an older version, without this table.
+    """
+    table = "elements" if constants else "ELEMENTS"
+    if not hasattr(model, table):
+        raise ModelError(f"no {table}, which say what friction acts along; emit it again with this version of symgen", file=model.NAME)
+    emitted = cast(Any, model)
+    return cast(Mapping[str, Any], emitted.elements(**constants) if constants else emitted.ELEMENTS)
+
+
+def base_columns(model: GeneratedModel, names: str | Sequence[str], essential: Sequence[str], *path: str) -> tuple[str, ...]:
+    """Columns of the setting at `path`: the `essential` ones, "all", or names; SettingsError for a name that is no base parameter."""
+    wanted = {"essential": essential, "all": model.BASE_PARAMETERS}[names] if isinstance(names, str) else names
+    if unknown := [name for name in wanted if name not in model.BASE_PARAMETERS]:
+        raise SettingsError(f"no parameter {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}", path=path)
+    return tuple(wanted)
 
 
 def joint_units(model: GeneratedModel) -> tuple[str, ...]:

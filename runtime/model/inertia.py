@@ -23,7 +23,7 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.errors import InputError, ModelError
-from runtime.model.generated import GeneratedModel, require
+from runtime.model.generated import GeneratedModel, elements_of, require
 
 Array = np.ndarray
 
@@ -117,13 +117,11 @@ def physical_model(model: GeneratedModel, constants: Mapping[str, float] | None 
         A model of an older version, without these tables.
     """
     require(model, "base_parameters")
-    needed = ("STANDARD_PARAMETERS", "LINKS", "ELEMENTS", *(["elements"] if constants else []))
-    missing = [name for name in needed if not hasattr(model, name)]
-    if missing:
+    elements = elements_of(model, constants)
+    if missing := [name for name in ("STANDARD_PARAMETERS", "LINKS") if not hasattr(model, name)]:
         raise ModelError(f"no {', '.join(missing)}; emit it again with this version of symgen", file=model.NAME)
     emitted = cast(Any, model)
     standard: tuple[str, ...] = tuple(emitted.STANDARD_PARAMETERS)
-    elements = emitted.elements(**constants) if constants else emitted.ELEMENTS
     return PhysicalModel(
         standard=standard,
         base=tuple(model.BASE_PARAMETERS),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib.abc
 import importlib.util
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
 
@@ -23,9 +24,6 @@ class _Checked(importlib.abc.InspectLoader):
     def get_source(self, fullname: str) -> str:
         return self.text
 
-    def is_package(self, fullname: str) -> bool:
-        return False
-
 
 def module_of(path: Path) -> ModuleType:
     """The module of an emitted file; ModelError with the line of anything an emitter does not write."""
@@ -37,10 +35,7 @@ def module_of(path: Path) -> ModuleType:
     check_source(text, path.name)
     name = f"generated_{path.stem}"
     loader = _Checked(text)
-    spec = importlib.util.spec_from_loader(name, loader, origin=str(path))
-    if spec is None:
-        raise ModelError("cannot be loaded", file=str(path))
-    module = importlib.util.module_from_spec(spec)
+    module = importlib.util.module_from_spec(ModuleSpec(name, loader, origin=str(path)))
     module.__file__ = str(path)
     try:
         loader.exec_module(module)

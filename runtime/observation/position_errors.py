@@ -23,7 +23,7 @@ import numpy as np
 
 from runtime.errors import SettingsError
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, drives_of
 from runtime.observation.filters import States, filtered_states
 from runtime.observation.noise_gain import Bandwidth, bandwidth
 from runtime.observation.observation import decimated_torque, observation_from_states
@@ -174,7 +174,7 @@ def perturbation(
     selection = select_rows(record, states.qd, signals, study.rows)
     torque = decimated_torque(record.tau, selection)
     observation = observation_from_states(model, states, torque, selection, files=record.files, columns=names, constants=constants)
-    switching = switches(model, names)
+    switching = switches(model, names, constants)
     window = states[selection.samples]
     root = encoder_root(model, study, drives)
     smooth, errors, speeds = _smooth(model, window, selection, observation, band, root, switching, dict(constants or {}))
@@ -220,7 +220,7 @@ def encoder_root(model: GeneratedModel, study: Study, drives: Drives | None = No
     n = len(model.JOINTS)
     if study.cestac.side == "joint":
         return np.eye(n)
-    drives = Drives.from_mapping(model.DRIVES) if drives is None and model.DRIVES is not None else drives
+    drives = drives or drives_of(model)
     if drives is None:
         raise SettingsError(
             f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("cestac", "side")

@@ -16,7 +16,7 @@ References: Price (1958) and Bussgang (1952) for the covariances; Mehler's expan
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import factorial
 
@@ -25,7 +25,7 @@ from scipy.fft import next_fast_len, rfft
 from scipy.special import erf
 
 from runtime.errors import ModelError
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, elements_of
 from runtime.observation.filters import decimated
 from runtime.observation.noise_gain import Bandwidth
 from runtime.settings.study import Decimate
@@ -86,11 +86,12 @@ class Switched:
         return Switched(sigma, shift, slope / sigma, variance * sigma)
 
 
-def switches(model: GeneratedModel, names: Sequence[str]) -> tuple[Switch, ...]:
-    """Columns among `names` that switch, from the ELEMENTS of the model; ModelError where it has none or one acts along a passive joint."""
-    elements = getattr(model, "ELEMENTS", None)
-    if elements is None:
-        raise ModelError("no ELEMENTS, which say what friction acts along; emit the model again", file=model.NAME)
+def switches(model: GeneratedModel, names: Sequence[str], constants: Mapping[str, float] | None = None) -> tuple[Switch, ...]:
+    """Columns among `names` that switch, from the elements of the model; ModelError where it has none or one acts along a passive joint.
+
+    constants : values in place of the robot file's.
+    """
+    elements = elements_of(model, constants)
     switching = []
     for column, name in enumerate(names):
         element = elements.get(name, elements.get(name.removesuffix("R")))

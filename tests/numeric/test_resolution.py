@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -224,6 +225,16 @@ def test_what_no_prediction_goes_through_is_refused(emps):
         advise(model, record, study, encoders=("7",))
     with pytest.raises(ModelError, match="ELEMENTS"):
         switches(__import__("planar_2r_model"), ("FS1",))
+
+
+def test_switches_follow_the_constants_given():
+    """A belt of ratio KR: friction of the motor acts along q2 + KR q1, at the ratio given, not that of the robot file."""
+
+    def elements(*, KR=1.0):
+        return {"FSM2": ("coulomb", "both", {1: KR, 2: 1.0})}
+
+    belt = SimpleNamespace(NAME="belt", JOINTS=(1, 2), elements=elements, ELEMENTS=elements())
+    assert [switches(belt, ("FSM2",), constants)[0].G.tolist() for constants in (None, {"KR": 2.0})] == [[1.0, 1.0], [2.0, 1.0]]
 
 
 def test_where_a_curve_crosses():
