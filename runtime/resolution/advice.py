@@ -17,8 +17,7 @@ from runtime.table import Table
 
 Array = np.ndarray
 
-AGREED = 0.3
-"""Relative difference of predicted and sampled %e that passes as agreement: 15 % in Delta, as %e grows with its square."""
+AGREED = 0.3  # Relative difference of predicted and sampled %e that passes as agreement: 15 % in Delta, as %e grows with its square
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import assemble
 from runtime.estimators.methods import linear_system
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, joint_units
+from runtime.model.generated import GeneratedModel, drives_of, joint_units
 from runtime.observation.observation import stack
 from runtime.observation.position_errors import NormalEquations, Perturbation, perturbation
 from runtime.records.provenance import origin
@@ -47,18 +47,13 @@ from runtime.settings.study import Study, to_mapping
 Array = np.ndarray
 Progress = Callable[[int, int], None]
 
-LIMITS = (NEGLIGIBLE, BIASED)
-"""%e at which a step is sought."""
+LIMITS = (NEGLIGIBLE, BIASED)  # %e at which a step is sought
 VARIANCE = {"two-point": 1.0, "gaussian": 1.0, "uniform": 1 / 3, "quantise": 1 / 3}
 """Variance of a rounding over Delta^2, `runtime.resolution.rounding`."""
-RATIO = 1.3
-"""Ratio of neighbouring steps of a curve."""
-WALK = 40
-"""Steps tried below and above the first guess."""
-ALL = "all"
-"""Label of the advice on all encoders alike."""
-BELOW, ABOVE = 3, 9
-"""Steps of the curve of all encoders below the first limit and above the last: factors of 2 and 10."""
+RATIO = 1.3  # Ratio of neighbouring steps of a curve
+WALK = 40  # Steps tried below and above the first guess
+ALL = "all"  # Label of the advice on all encoders alike
+BELOW, ABOVE = 3, 9  # Steps of the curve of all encoders below the first limit and above the last: factors of 2 and 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +152,7 @@ def advise(
     selections = _selections(model, encoders)
     advices = []
     for label, own in selections.items():
-        unit = _unit([units[i] for i in own])
+        unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
         advice = _advice(predictor, label, own, names, decisive, unit)
         if confirm:
             advice = confirmed(advice, reference, partial(sampled_level, task, parts, reference, own))
@@ -170,7 +165,7 @@ def advise(
         encoders=tuple(advices),
         asked=tuple(asked),
         steps=np.array([predictor.change(delta, every) for delta in asked]).reshape(len(asked), len(names)),
-        torque_sigma=torque_sigma(predictor, drives or _drives(model)),
+        torque_sigma=torque_sigma(predictor, drives or drives_of(model)),
         assumptions=assumptions(study, records, parts, reference),
         settings={
             **measured.settings,
@@ -180,10 +175,6 @@ def advise(
         },
         provenance={**reference.provenance, "seed": study.cestac.seed},
     )
-
-
-def _unit(units: Sequence[str]) -> str:
-    return " or ".join(sorted(set(units), reverse=True))
 
 
 def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
@@ -328,7 +319,3 @@ def _refuse(study: Study) -> None:
         )
     if study.estimate.weights == "covariance":
         raise SettingsError("'covariance'; the prediction knows weights by joint, use joint or iterated", path=("estimate", "weights"))
-
-
-def _drives(model: GeneratedModel) -> Drives | None:
-    return None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)

@@ -28,7 +28,7 @@ from runtime.estimators.methods import linear_system
 from runtime.model.compile_cache import processor
 from runtime.model.compiled import target_of, text_of
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, drives_of
 from runtime.parallel import results
 from runtime.records.provenance import origin
 from runtime.records.record import Record
@@ -43,8 +43,7 @@ from runtime.settings.study import CestacSettings, Study, to_mapping
 Progress = Callable[[int, int], None]
 Key = tuple[int, int]
 
-BLOCK = 20
-"""Most runs of one task: about a second, beside which sending it is nothing."""
+BLOCK = 20  # Most runs of one task: about a second, beside which sending it is nothing
 
 
 def cestac(
@@ -99,7 +98,7 @@ def cestac(
     study = study or Study()
     settings, model = study.cestac, usable(model)
     records = (records,) if isinstance(records, Record) else tuple(records)
-    drives = Drives.from_mapping(model.DRIVES) if drives is None and model.DRIVES is not None else drives
+    drives = drives or drives_of(model)
     if settings.side == "motor" and drives is None:
         raise SettingsError(
             f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("cestac", "side")

@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, ModelText
+from runtime.model.generated import GeneratedModel, ModelText, base_columns
 from runtime.observation.filters import filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, stack
 from runtime.observation.rows import Selection, select_rows
@@ -97,18 +96,10 @@ def study_columns(
 
     columns : essential names where they are known.   Raises SettingsError for a name that is no base parameter.
     """
-    wanted = study.cestac.columns
-    if wanted == "essential":
-        if columns is None:
-            observations = [observe(model, record, study, constants=constants) for record in records]
-            return essential_of(stack(observations), study.essential, study.estimate).names
-        wanted = tuple(columns)
-    elif wanted == "all":
-        wanted = tuple(model.BASE_PARAMETERS)
-    if unknown := [name for name in wanted if name not in model.BASE_PARAMETERS]:
-        message = f"no parameter {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}"
-        raise SettingsError(message, path=("cestac", "columns"))
-    return wanted
+    if study.cestac.columns == "essential" and columns is None:
+        observations = [observe(model, record, study, constants=constants) for record in records]
+        return essential_of(stack(observations), study.essential, study.estimate).names
+    return base_columns(model, study.cestac.columns, columns or (), "cestac", "columns")
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:

@@ -40,18 +40,13 @@ Array = np.ndarray
 
 SCHEMA = "symgen-cestac/1"
 """Kind and version of the JSON layout, published as runtime/schemas/cestac.schema.json (`symgen schema --of cestac`)."""
-NEGLIGIBLE = 1.0
-"""%e below which the estimator is practically unbiased (chapter, section 3)."""
-BIASED = 5.0
-"""%e above which it is biased."""
-DECIDING = 10.0
-"""%sigma (11) of the reference above which a parameter does not decide: in Table 2, MX3, OFFSET4 and OFFSET6."""
-CONFIDENCE = 0.95
-"""Probability of the Student intervals."""
+NEGLIGIBLE = 1.0  # %e below which the estimator is practically unbiased (chapter, section 3)
+BIASED = 5.0  # %e above which it is biased
+DECIDING = 10.0  # %sigma (11) of the reference above which a parameter does not decide: in Table 2, MX3, OFFSET4 and OFFSET6
+CONFIDENCE = 0.95  # Probability of the Student intervals
 LISTED = 1000
 """Largest number of runs that the JSON text lists; beyond, they are in the archives of the checkpoint (`runtime.resolution.checkpoint`)."""
-MOST_RUNS = 100_000
-"""Largest number of runs that `runs_needed` answers."""
+MOST_RUNS = 100_000  # Largest number of runs that `runs_needed` answers
 Verdict = Literal["unbiased", "doubtful", "biased"]
 
 

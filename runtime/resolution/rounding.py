@@ -18,8 +18,7 @@ import numpy as np
 Array = np.ndarray
 Mode = Literal["two-point", "uniform", "gaussian", "quantise"]
 
-ADDED = ("two-point", "gaussian", "uniform")
-"""Modes that add Delta xi."""
+ADDED = ("two-point", "gaussian", "uniform")  # Modes that add Delta xi
 
 
 def stream(seed: int, *key: int) -> np.random.Generator:

@@ -129,25 +129,19 @@ class RecordWorkspace:
 Workspace = NumpyWorkspace | CompiledWorkspace
 
 
-class _Kept(threading.local):
-    """The workspace of the last task of this thread."""
-
-    task: Task | None = None
-    work: Workspace | None = None
-
-
-_kept = _Kept()
+_kept = threading.local()  # task and workspace of the last run of this thread
 
 
 def workspace(task: Task) -> Workspace:
     """The workspace of a task, made at its first run in this thread."""
-    if _kept.work is None or _kept.task is not task:
+    if getattr(_kept, "task", None) is not task:
         model = task.model.load() if isinstance(task.model, ModelText) else task.model
         _kept.work = CompiledWorkspace(task, model) if isinstance(model, CompiledModel) else NumpyWorkspace(task, model)
         _kept.task = task
-    return _kept.work
+    work: Workspace = _kept.work
+    return work
 
 
 def forget() -> None:
     """Give back the room of this thread's workspace."""
-    _kept.task = _kept.work = None
+    _kept.__dict__.clear()

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 Array = np.ndarray
 
-NORMAL, TRIANGULAR = "normal equations", "triangular factor"
-"""How the least squares of a run was solved."""
+NORMAL, TRIANGULAR = "normal equations", "triangular factor"  # How the least squares of a run was solved
 
 
 @dataclass(frozen=True)
@@ -91,9 +90,6 @@ class Runs(Sequence[Run]):
     def __getitem__(self, i: int) -> Run:  # type: ignore[override]
         method = NORMAL if self.normal[i] else TRIANGULAR
         return Run(int(self.level[i]), int(self.run[i]), tuple(self.X[i].tolist()), float(self.residual_norm[i]), method)
-
-    def __iter__(self) -> Iterator[Run]:
-        return (self[i] for i in range(len(self)))
 
 
 @dataclass(frozen=True)

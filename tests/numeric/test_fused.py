@@ -209,7 +209,7 @@ def test_refusals(planar):
         FilteredStates(q, RATE, PLAIN, room).rows(slice(5, 30))
     with pytest.raises(InputError, match="no column nothing"):
         SignalEntries(planar, ("nothing",))
-    with pytest.raises(InputError, match="no constants nothing"):
+    with pytest.raises(InputError, match="no constant nothing"):
         constant_values(planar, {"nothing": 1.0})
 
 

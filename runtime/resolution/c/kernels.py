@@ -16,7 +16,7 @@ import ctypes
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy.signal import sosfilt_zi
@@ -24,6 +24,7 @@ from scipy.signal import sosfilt_zi
 from runtime.errors import InputError
 from runtime.model.compile_cache import FLAGS, NotCompiledError, cache_folder, shared_object
 from runtime.model.compiled import CompiledModel
+from runtime.model.generated import GeneratedModel, constants_of
 from runtime.observation.decimation import Plan
 from runtime.observation.filters import butterworth, decimation_plan, median_filtered, require_longer
 from runtime.settings.study import Decimate, Lowpass
@@ -223,10 +224,7 @@ class SignalEntries:
 
 def constant_values(model: CompiledModel, constants: Mapping[str, float]) -> Array:
     """Geometry and gravity in the order of CONSTANTS, some of them in place of the robot file's."""
-    unknown = set(constants) - set(model.CONSTANTS)
-    if unknown:
-        raise InputError(f"{model.NAME} has no constants {', '.join(sorted(unknown))}; there are {', '.join(model.CONSTANTS) or 'none'}")
-    return np.array([float({**model.CONSTANTS, **constants}[c]) for c in model.CONSTANTS] or [0.0])
+    return np.array([*constants_of(cast(GeneratedModel, model), constants).values()] or [0.0], dtype=float)
 
 
 @lru_cache(maxsize=8)
