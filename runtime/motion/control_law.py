@@ -10,14 +10,14 @@ g_j = J_j(X)/J_j(reference) a simulation with other parameters keeps the bandwid
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from runtime.errors import SettingsError
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, drives_of
 from runtime.settings.controller import Controller
 from runtime.settings.schema import PerJoint
 
@@ -49,7 +49,6 @@ class ControlLaw:
         Whether the velocity is the mean difference over two ticks.
     R, offset : ndarray, shape (n, n) and (n,)
         The encoder shows R (q - offset).
-    joints : int
     """
 
     P: Array
@@ -70,10 +69,11 @@ class ControlLaw:
     averaged: bool
     R: Array
     offset: Array
-    joints: int = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", len(self.P))
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.P)
 
     def matrix(self, g: Array, *, ideal: bool) -> Array:
         """`law` of a tick, (n, columns): the vectors, R, R^-1, offset. ideal : no steps of encoder and converter."""
@@ -116,10 +116,9 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
     else:
         gains = {"P": kv * kp, "Vr": kv * cv, "Vm": kv, "K": ki}
         integral = {"Ie": kp, "Ir": cv, "Im": one}
-    motor = controller.encoder.side == "motor"
-    if motor and model.DRIVES is None:
+    drives = drives_of(model) if controller.encoder.side == "motor" else Drives(np.eye(n), zero, one)
+    if drives is None:
         raise SettingsError(f"motor; {model.NAME} has no drives", path=("controller", "encoder", "side"))
-    drives = Drives.from_mapping(model.DRIVES if motor and model.DRIVES is not None else {"ratio": np.eye(n)})
     return ControlLaw(
         **{key: gain * x for key, x in gains.items()},
         **integral,

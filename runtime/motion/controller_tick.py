@@ -23,7 +23,7 @@ import numpy as np
 from runtime.model.casadi import SymbolicModel
 from runtime.model.compile_cache import FallbackWarning, NotCompiledError, cache_folder, shared_object
 from runtime.motion.control_law import VECTORS
-from runtime.motion.dry_friction import DryFriction, event_function, friction_function, rest_function
+from runtime.motion.dry_friction import DryFriction, event_function, friction_function, kinetic, rest_function
 from runtime.motion.result import REST
 
 Array = np.ndarray
@@ -149,7 +149,7 @@ def plant_function(model: SymbolicModel, friction: DryFriction, constants: dict[
 def sliding_friction(friction: DryFriction, qd: MX, plus: MX, minus: MX) -> tuple[MX, MX]:
     """f and direction of every element where all of them slide."""
     direction = ca.sign(ca.DM(friction.G) @ qd)
-    return (direction > 0) * plus - (direction < 0) * minus, direction
+    return kinetic(direction, plus, minus), direction
 
 
 def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:

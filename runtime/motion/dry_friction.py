@@ -83,7 +83,7 @@ def friction_function(model: SymbolicModel, friction: DryFriction, constants: di
     Y = solved[:, 1:]
     slip = G @ qd
     moving = ca.sign(slip) * (ca.fabs(slip) > REST)
-    f_moving = _kinetic(moving, plus, minus)
+    f_moving = kinetic(moving, plus, minus)
     f, mode = _at_rest(G @ Y, G @ (solved[:, 0] - Y @ f_moving), moving, plus, minus)
     f = f + f_moving
     names = ["q", "qd", "tau", "X", "plus", "minus"]
@@ -92,7 +92,8 @@ def friction_function(model: SymbolicModel, friction: DryFriction, constants: di
     )
 
 
-def _kinetic(direction: SX, plus: SX, minus: SX) -> SX:
+def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
+    """Forces (m,) of elements that slide in a direction; 0 for direction 0."""
     return (direction > 0) * plus - (direction < 0) * minus
 
 
@@ -104,7 +105,7 @@ def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
     f = ca.SX.zeros(m)
     for last in [False] * PIVOTS + [True]:
         held = resting * (mode == 0)
-        bound = resting * _kinetic(mode, plus, minus)
+        bound = resting * kinetic(mode, plus, minus)
         f = held * solve(_masked(D, held), held * (free - D @ bound)) + bound
         if last:
             break

@@ -78,10 +78,7 @@ class Simulation:
 
     def to_csv(self) -> str:
         """t, q1 ..., tau1 ..., qr1 ...: the measured columns, SI, joint side, as `identify` reads them."""
-        n = self.q.shape[1]
-        names = ["t", *(f"{x}{j}" for x in ("q", "tau", "qr") for j in range(1, n + 1))]
-        rows = np.column_stack([self.t, self.q_measured, self.tau_measured, self.q_r])
-        return "\n".join([",".join(names), *(",".join(f"{x:.10g}" for x in row) for row in rows), ""])
+        return csv_text(self.t, q=self.q_measured, tau=self.tau_measured, qr=self.q_r)
 
     @property
     def units(self) -> tuple[tuple[str, str], ...]:
@@ -131,6 +128,13 @@ class Simulation:
 
     def __str__(self) -> str:
         return self.to_table()
+
+
+def csv_text(t: Array, **signals: Array) -> str:
+    """CSV with the columns t, then NAME1, NAME2 ... of each signal, shape (N, n), ten digits."""
+    names = ["t", *(f"{name}{j + 1}" for name, x in signals.items() for j in range(x.shape[1]))]
+    rows = np.column_stack([t, *signals.values()])
+    return "\n".join([",".join(names), *(",".join(f"{x:.10g}" for x in row) for row in rows), ""])
 
 
 def _rms(x: Array) -> Array:

@@ -11,7 +11,7 @@ the sampled loop stable along the reference: what is not raises SimulationError,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from types import ModuleType
@@ -23,7 +23,7 @@ from scipy.signal import butter, lfilter
 
 from runtime.errors import InputError, SettingsError
 from runtime.model.casadi import SymbolicModel, casadi_path, load_symbolic
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, constants_of
 from runtime.motion.control_law import ControlLaw, continuous_pole, control_law, discrete_poles
 from runtime.motion.controller_tick import LoopInputs, blocks, compiled, tick_function
 from runtime.motion.dry_friction import DryFriction, dry_friction
@@ -69,16 +69,13 @@ class Simulator:
         constants: Mapping[str, float] | None = None,
         in_c: bool = True,
     ) -> None:
-        if unknown := sorted(set(constants or {}) - set(model.CONSTANTS)):
-            raise InputError(f"{model.NAME} has no constant {', '.join(unknown)}; there are {', '.join(model.CONSTANTS)}")
+        constants_of(model, constants or {})
         self.model, self.controller, self.constants = model, controller, dict(constants or {})
         self.law: ControlLaw = control_law(controller, model)
         self.symbolic = symbolic or load_symbolic(casadi_path(model), of=model)
         self.friction: DryFriction = dry_friction(model)
         self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
-        self._ticks: dict[int, Any] = {}
-        self._blocks: dict[int, Any] = {}
-        self._tangents: dict[int, Any] = {}
+        self._compiled: dict[tuple[Callable[..., Any], int], Any] = {}
         self._bias = _rest_functions(self.symbolic, self.constants)
 
     def run(
@@ -140,14 +137,9 @@ class Simulator:
         inputs = self._inputs(X, reference, g, start, disturbance, feedforward, None)
         states, out = self._iterated(inputs)
         run = self._result(inputs, states, out, reference, ideal=True)
-        if inputs.substeps not in self._tangents:
-            tick = tangent_function(self.symbolic, self.friction, self.constants, inputs.substeps, self.controller.integrator)
-            self._tangents[inputs.substeps] = (compiled(tick) if self._in_c else tick).mapaccum(TANGENT_BLOCK)
+        function = self._ticks(tangent_function, inputs.substeps, TANGENT_BLOCK)
         before = np.vstack([inputs.x, states[:-1]])
-        tangent = tangent_along(
-            self._tangents[inputs.substeps], before, inputs, self.law.flags, TANGENT_BLOCK, self.controller.record_every
-        )
-        return run, tangent
+        return run, tangent_along(function, before, inputs, self.law.flags, TANGENT_BLOCK, self.controller.record_every)
 
     def _inputs(
         self,
@@ -233,20 +225,19 @@ class Simulator:
             )
         return steps
 
-    def tick(self, substeps: int) -> Any:
-        """The CasADi function of one tick (`controller_tick.tick_function`)."""
-        if substeps not in self._ticks:
-            tick = tick_function(self.symbolic, self.friction, self.constants, substeps, self.controller.integrator)
-            self._ticks[substeps] = compiled(tick) if self._in_c else tick
-        return self._ticks[substeps]
+    def _ticks(self, function_of: Callable[..., Any], substeps: int, block: int) -> Any:
+        """The CasADi function of `block` ticks, each by `tick_function` or `tangent_function`; made once."""
+        key = function_of, substeps
+        if key not in self._compiled:
+            tick = function_of(self.symbolic, self.friction, self.constants, substeps, self.controller.integrator)
+            self._compiled[key] = (compiled(tick) if self._in_c else tick).mapaccum(block)
+        return self._compiled[key]
 
     def _iterated(self, inputs: LoopInputs) -> tuple[Array, Array]:
         """BLOCK ticks at a time: states after each tick (S + N, 6n), outputs y, tau, qdd (S + N, 3n)."""
-        if inputs.substeps not in self._blocks:
-            self._blocks[inputs.substeps] = self.tick(inputs.substeps).mapaccum(BLOCK)
-        x, states, out = inputs.x, [], []
+        function, x, states, out = self._ticks(tick_function, inputs.substeps, BLOCK), inputs.x, [], []
         for rows, used in blocks(inputs.signals, BLOCK):
-            after, outputs = self._blocks[inputs.substeps](x, rows.T, inputs.X, inputs.law, self.law.flags)
+            after, outputs = function(x, rows.T, inputs.X, inputs.law, self.law.flags)
             states.append(after.full().T[:used])
             out.append(outputs.full().T[:used])
             x = states[-1][-1]
@@ -267,7 +258,7 @@ class Simulator:
         if self.controller.feedforward == "none":
             return np.zeros_like(reference.q)
         X = parameters_of(self.model, self.controller)
-        return np.asarray(self.model.inverse_dynamics(reference.q, reference.qd, reference.qdd, X, **self.constants))  # type: ignore[attr-defined]
+        return np.asarray(self.model.inverse_dynamics(reference.q, reference.qd, reference.qdd, X, **self.constants))
 
     def _noise(self, rng: np.random.Generator, N: int) -> tuple[Array, Array, Array]:
         """Encoder noise, torque on the arm, noise of the recorded torque: (N, n) each."""
@@ -357,8 +348,7 @@ def parameters_of(model: GeneratedModel, controller: Controller | None = None) -
 
 def inertia_ratio(model: GeneratedModel, X: Array, X_reference: Array, reference: Reference) -> Array:
     """g_j = J_j(X)/J_j(X_reference), J_j the mean of A_jj over the reference: gains times g keep the bandwidth of the loop. Shape (n,)."""
-    inertia_matrix = model.inertia_matrix  # type: ignore[attr-defined]
-    J, J_reference = (np.einsum("tjj->j", inertia_matrix(reference.q, x)) for x in (X, X_reference))
+    J, J_reference = (np.einsum("tjj->j", model.inertia_matrix(reference.q, x)) for x in (X, X_reference))
     return np.asarray(J / J_reference)
 
 
