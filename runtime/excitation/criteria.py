@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.model.generated import GeneratedModel, require
+from runtime.model.generated import GeneratedModel, base_columns, require
 from runtime.motion.dry_friction import dry_friction
 from runtime.observation.filters import decimation_factor
 from runtime.observation.noise_gain import bandwidth
@@ -163,13 +163,7 @@ def weights_of(
 ) -> Weights:
     """Columns, deviations and sizes from the parameters X by name; `essential`, `s`: those of an estimate where there is one."""
     n = len(model.JOINTS)
-    if settings.columns == "essential":
-        names = tuple(essential) or tuple(model.BASE_PARAMETERS)
-    else:
-        names = tuple(model.BASE_PARAMETERS) if settings.columns == "all" else tuple(settings.columns)
-    unknown = [name for name in names if name not in model.BASE_PARAMETERS]
-    if unknown:
-        raise SettingsError(f"no parameter {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}", path=("columns",))
+    names = base_columns(model, settings.columns, essential or model.BASE_PARAMETERS, "columns")
     deviation = np.array(settings.torque_sigma or tuple(s) or (1.0,) * n, dtype=float)
     if deviation.shape != (n,) or not np.all(deviation > 0):
         raise SettingsError(f"{deviation.tolist()}; expected {n} numbers above 0", path=("torque_sigma",))
@@ -215,9 +209,8 @@ def excesses(
     The rate of the torque is that without dry friction, whose jump at a reversal no motion avoids.
     """
     require(model, "inverse_dynamics")
-    functions: Any = model
     t, q, qd, qdd = motion.sampled(settings.rate if rate is None else rate)
-    tau = functions.inverse_dynamics(q, qd, qdd, X)
+    tau = model.inverse_dynamics(q, qd, qdd, X)
     free = np.full(q.shape[1], np.inf)
     bounds = [
         ("position", q, limits.lower, limits.upper),
@@ -226,7 +219,7 @@ def excesses(
         ("torque", tau, -limits.tau, limits.tau),
     ]
     if settings.torque_rate:
-        smooth = functions.inverse_dynamics(q, qd, qdd, X * dry_friction(model).smooth)
+        smooth = model.inverse_dynamics(q, qd, qdd, X * dry_friction(model).smooth)
         bounds.append(("rate of torque", np.abs(np.gradient(smooth, t, axis=0)), -free, np.array(settings.torque_rate)))
     if settings.torque_rms:
         bounds.append(("rms torque", np.sqrt(np.mean(tau**2, axis=0))[None], -free, np.array(settings.torque_rms)))
@@ -243,10 +236,9 @@ def excesses(
 
 def usage(model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array) -> dict[str, list[float]]:
     """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint; of a range, measured from its middle."""
-    functions: Any = model
     _, q, qd, qdd = motion.sampled(rate)
     middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
     shares = {"position": (q - middle) / half, "velocity": qd / limits.qd, "acceleration": qdd / limits.qdd}
     if np.isfinite(limits.tau).any():
-        shares["torque"] = functions.inverse_dynamics(q, qd, qdd, X) / limits.tau
+        shares["torque"] = model.inverse_dynamics(q, qd, qdd, X) / limits.tau
     return {what: np.abs(x).max(axis=0).tolist() for what, x in shares.items()}

@@ -112,8 +112,7 @@ def _states(settings: ExcitationSettings, p: Sequence[Any]) -> tuple[Any, Any, A
     parts = []
     for family, coefficients in zip(settings.families, p, strict=True):
         t = np.linspace(0.0, family.duration, max(3, round(family.duration * settings.grid) + 1))
-        joints = [family.joint(t, column, ca) for column in ca.horzsplit(coefficients)]
-        parts.append([ca.horzcat(*(joint[k] for joint in joints)) for k in range(3)])
+        parts.append(_at(family, coefficients, t))
     q, qd, qdd = (ca.vertcat(*(part[k] for part in parts)) for k in range(3))
     return q, qd, qdd
 
@@ -158,13 +157,13 @@ def _constraints(symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q:
     rows += _distances(symbolic, settings, q)
     ends = []
     for k, (family, coefficients) in enumerate(zip(settings.families, p, strict=True)):
-        begin, end = (_at(family, coefficients, t) for t in (0.0, family.duration))
+        begin, end = ([x.T for x in _at(family, coefficients, np.array([t]))] for t in (0.0, family.duration))
         if isinstance(family, Fourier):
             rows += [(begin[1] / limits.qd, 0.0, 0.0), (begin[2] / limits.qdd, 0.0, 0.0)]
         speed = getattr(family, "speed", None)
         if speed is not None:
-            corners = [_at(family, coefficients, family.blend / 2 + family.travel * (i + 0.5))[1] for i in range(family.points - 1)]  # type: ignore[attr-defined]
-            rows += [(corner / speed, -1.0, 1.0) for corner in corners]
+            middles = family.blend / 2 + family.travel * (np.arange(family.points - 1) + 0.5)  # type: ignore[attr-defined]
+            rows.append((_at(family, coefficients, middles)[1].T / speed, -1.0, 1.0))
         ends.append((begin[0], end[0]))
         if k:
             rows.append(((begin[0] - ends[k - 1][1]) / half, 0.0, 0.0))
@@ -271,10 +270,10 @@ def smoothed(function: Any, v0: float) -> Any:
     return ca.Function(f"{function.name()}_smooth", inputs, outputs)
 
 
-def _at(family: Any, p: Any, t: float) -> list[Any]:
-    """q, qd, qdd of all joints at one time, shape (n, 1)."""
-    joints = [family.joint(np.array([t]), column, ca) for column in ca.horzsplit(p)]
-    return [ca.vertcat(*(joint[k] for joint in joints)) for k in range(3)]
+def _at(family: Any, p: Any, t: Array) -> list[Any]:
+    """q, qd, qdd of all joints at the times t, shape (M,): (M, n) each."""
+    joints = [family.joint(t, column, ca) for column in ca.horzsplit(p)]
+    return [ca.horzcat(*(joint[k] for joint in joints)) for k in range(3)]
 
 
 def _guess(problem: Problem, family: Any, rng: np.random.Generator) -> Array:

@@ -36,6 +36,7 @@ from runtime.excitation.optimiser import Problem, Start, improved, one_start
 from runtime.model.casadi import casadi_path
 from runtime.model.generated import GeneratedModel, require
 from runtime.motion.dry_friction import dry_friction
+from runtime.motion.result import csv_text
 from runtime.motion.simulation import parameters_of
 from runtime.observation.observation import observe
 from runtime.parallel import results
@@ -111,16 +112,13 @@ class Excitation:
 
     def sampled(self) -> tuple[Array, Array, Array, Array, Array]:
         """t, shape (N,), and q, qd, qdd, tau, shape (N, n), at the controller rate."""
-        functions: Any = self.model
         t, q, qd, qdd = self.motion.sampled(self.settings.rate)
-        return t, q, qd, qdd, functions.inverse_dynamics(q, qd, qdd, self.known.X)
+        return t, q, qd, qdd, self.model.inverse_dynamics(q, qd, qdd, self.known.X)
 
     def to_csv(self) -> str:
         """t, q1 ..., qd1 ..., qdd1 ... at the controller rate, SI: a reference that `simulate` reads."""
         t, q, qd, qdd, _ = self.sampled()
-        header = ",".join(["t", *(f"{x}{j + 1}" for x in ("q", "qd", "qdd") for j in range(q.shape[1]))])
-        rows = "\n".join(",".join(f"{x:.10g}" for x in row) for row in np.column_stack([t, q, qd, qdd]))
-        return f"{header}\n{rows}\n"
+        return csv_text(t, q=q, qd=qd, qdd=qdd)
 
     @property
     def usage(self) -> dict[str, list[float]]:
