@@ -14,8 +14,8 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.model.drives import Drives
 from runtime.records.formats.columns import Array, Table
-from runtime.records.formats.joint_states import joint_columns
-from runtime.settings.record import Columns, RecordSettings
+from runtime.records.formats.joint_states import joint_columns, named_columns
+from runtime.settings.record import BY_NAME, Columns, RecordSettings
 from runtime.settings.units import COMMANDS, position_unit, torque_unit
 
 
@@ -54,23 +54,38 @@ def conversion(settings: RecordSettings, drives: Drives | None, first: Table, la
     return Conversion(positions, scale * constant if of_torques is None else scale, of_positions, of_torques)
 
 
-def column_names(settings: RecordSettings, first: Table, last: Table) -> Columns:
-    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag: the joints of its messages."""
+def column_names(settings: RecordSettings, first: Table, last: Table, joints: Sequence[str] = ()) -> Columns:
+    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag: the joints of its messages.
+
+    joints : names of the joints of the robot, in its order: what `names` means in the settings, and what of a bag is read where they are left out.
+    """
     given = settings.columns
     t = given.t if given.t is not None or settings.rate is not None or "t" not in first.names else "t"
-    qr = given.qr or (_numbered("qr", first) if "qr1" in first.names else ())
+    qr = _meant(first, "qr", "", given.qr, joints) if given.qr else _numbered("qr", first) if "qr1" in first.names else ()
     if first.joints is not None and settings.units.t != "s":
         raise InputError(f"record.units.t is {settings.units.t}; time stamps of bags are read in s", file=first.file)
-    of_q = _meant(first, "q", "position", given.q)
-    of_tau = _meant(last, "tau", "effort", given.tau or (given.q if last.joints is not None else ()))
+    of_q = _meant(first, "q", "position", given.q, joints)
+    of_tau = _meant(last, "tau", "effort", given.tau or (given.q if last.joints is not None or given.q == BY_NAME else ()), joints)
+    if given.q == BY_NAME and first is last and set(of_q) & set(of_tau):
+        raise InputError(
+            f"columns {', '.join(of_q)} would be positions and torques; name those of the torques, record.columns.tau", file=first.file
+        )
     if not {*of_q} <= {*first.names} and {*of_q} <= {*last.names} and {*of_tau} <= {*first.names}:
         raise InputError(f"{first.file} holds the torques and {last.file} the positions; `files` are the positions, then the torques")
     return Columns(t, of_q, of_tau, qr)
 
 
-def _meant(table: Table, key: str, quantity: str, names: Sequence[str]) -> tuple[str, ...]:
-    if table.joints is not None:
-        return joint_columns(table, quantity, names)
+def _meant(table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]) -> tuple[str, ...]:
+    if names == BY_NAME and not joints:
+        raise InputError(
+            f"record.columns.{key} is {BY_NAME[0]}, but the robot has no name for every joint; add labels to the robot file",
+            file=table.file,
+        )
+    if table.joints is not None and quantity:
+        ours = names == BY_NAME or (not names and joints and {*joints} <= {*table.joints})
+        return joint_columns(table, quantity, joints if ours else names)
+    if names == BY_NAME:
+        return named_columns(table, key, joints)
     return tuple(names) or _numbered(key, table)
 
 

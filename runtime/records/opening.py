@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from runtime.errors import InputError
+from runtime.errors import InputError, ModelError
 from runtime.model.drives import Drives
 from runtime.records.clock import Stamps
 from runtime.records.formats.columns import Array, Groups, Table
@@ -97,7 +97,9 @@ class RecordFiles:
         return require_finite(t, [self.columns.t or ""], self.first, start) * time_unit(self.settings.units.t)
 
 
-def open_record(settings: RecordSettings, label: Label, drives: Drives | None, folder: Path, *, by_blocks: bool = False) -> RecordFiles:
+def open_record(
+    settings: RecordSettings, label: Label, drives: Drives | None, folder: Path, *, joints: Sequence[str] = (), by_blocks: bool = False
+) -> RecordFiles:
     """The files of a record, opened.
 
     Parameters
@@ -108,12 +110,14 @@ def open_record(settings: RecordSettings, label: Label, drives: Drives | None, f
         Of the robot.
     folder : Path
         Where relative file names start.
+    joints : sequence of str
+        Names of the joints of the robot, where it has them.
     by_blocks : bool
         Refuse formats that are read whole only.
     """
     tables = [open_table(path, settings.topic, settings.decimal, by_blocks=by_blocks) for path in record_files(settings, folder)]
     first, last = tables[0], tables[-1]
-    names = column_names(settings, first, last)
+    names = column_names(settings, first, last, joints)
     groups, torques = _groups(names, len(tables))
     samples, widths = first.samples(groups), first.widths(groups)
     others = last.samples(torques) if torques else samples
@@ -145,6 +149,14 @@ def drives_of(model: Any) -> Drives | None:
     """Drives of an emitted model, where it has them."""
     drives = getattr(model, "DRIVES", None)
     return None if drives is None else Drives.from_mapping(drives)
+
+
+def names_of(model: Any) -> tuple[str, ...]:
+    """Names of the joints of an emitted model, in the order of JOINTS; none where the robot file does not name every joint."""
+    labels = getattr(model, "LABELS", {})
+    if not isinstance(labels, Mapping) or not all(isinstance(label, str) and label.isprintable() for label in labels.values()):
+        raise ModelError("LABELS are no table of names; emit the model again", file=model.NAME)
+    return tuple(labels[j] for j in model.JOINTS) if model is not None and labels.keys() >= {*model.JOINTS} else ()
 
 
 def _groups(names: Columns, files: int) -> tuple[Groups, Groups]:

@@ -21,7 +21,7 @@ from runtime.records.clock import rate_of
 from runtime.records.formats.columns import Array
 from runtime.records.labels import Label, labels
 from runtime.records.named import study_of
-from runtime.records.opening import RecordFiles, drives_of, open_record
+from runtime.records.opening import RecordFiles, drives_of, names_of, open_record
 from runtime.records.record import Record
 from runtime.records.resampling import Stretch, resampled
 from runtime.records.time_stamps import time_stamps
@@ -76,16 +76,16 @@ def read_records(
     records = [
         record
         for one, label in zip(settings, labels(settings), strict=True)
-        for record in read_pieces(one, label, drives_of(model), Path(folder or ""))
+        for record in read_pieces(one, label, drives_of(model), Path(folder or ""), names_of(model))
     ]
     for record in records if model is not None else ():
         require_joints(record.n, tuple(record.files), model)
     return records
 
 
-def read_pieces(settings: RecordSettings, label: Label, drives: Drives | None, folder: Path) -> list[Record]:
+def read_pieces(settings: RecordSettings, label: Label, drives: Drives | None, folder: Path, joints: Sequence[str] = ()) -> list[Record]:
     """The record, or the records into which `resample` splits it at gaps and where time goes back."""
-    opened = open_record(settings, label, drives, folder)
+    opened = open_record(settings, label, drives, folder, joints=joints)
     try:
         t, *signals = opened.read()
         stretches, rate, text = _uniform(opened, t, signals)

@@ -22,7 +22,7 @@ from runtime.records.clock import clock
 from runtime.records.formats.columns import BLOCK, Array
 from runtime.records.formats.table import BY_ENDING
 from runtime.records.labels import Label, labels
-from runtime.records.opening import RecordFiles, drives_of, open_record, record_files
+from runtime.records.opening import RecordFiles, drives_of, names_of, open_record, record_files
 from runtime.records.reading import read_records, require_joints
 from runtime.records.record import Record
 from runtime.records.stream import Stream
@@ -82,19 +82,21 @@ def open_streams(
     settings: Sequence[RecordSettings], model: GeneratedModel | None = None, *, folder: str | Path | None = None, block: int = BLOCK
 ) -> list[FileStream]:
     """Several records of one robot, to be read by blocks of `block` samples; as `read_records`."""
-    settings, drives = each_record(tuple(settings)), drives_of(model)
-    streams = [_stream(one, label, drives, Path(folder or ""), block) for one, label in zip(settings, labels(settings), strict=True)]
+    settings, drives, joints = each_record(tuple(settings)), drives_of(model), names_of(model)
+    streams = [
+        _stream(one, label, drives, joints, Path(folder or ""), block) for one, label in zip(settings, labels(settings), strict=True)
+    ]
     for stream in streams:
         require_joints(stream.n, tuple(stream.files), model)
     return streams
 
 
-def _stream(settings: RecordSettings, label: Label, drives: Drives | None, folder: Path, block: int) -> FileStream:
+def _stream(settings: RecordSettings, label: Label, drives: Drives | None, joints: Sequence[str], folder: Path, block: int) -> FileStream:
     if block < SHORTEST:
         raise InputError(f"blocks of {block} samples; expected at least {SHORTEST}")
     if settings.resample is not None:
         raise InputError("record.resample needs the whole record; set stream: off", file=", ".join(label.files))
-    opened = open_record(settings, label, drives, folder, by_blocks=True)
+    opened = open_record(settings, label, drives, folder, joints=joints, by_blocks=True)
     rate = settings.rate
     if opened.columns.t is not None:
         rate = clock(opened.stamps, lambda: opened.times(block))

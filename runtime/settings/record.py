@@ -36,11 +36,15 @@ TorqueUnit = Annotated[Text, _known(torque_unit)]
 Factor = Annotated[PerJoint[Real] | Text, Field(union_mode="left_to_right")]
 
 
+BY_NAME = ("names",)  # columns found by the names of the joints
+
+
 class Columns(Settings):
     """Names of the columns of a record file, one per joint.
 
     A name may be the number of the column (from 1) in a file without header, or an (N, n) array of a .npz or .mat file, which stands
-    for its n columns.
+    for its n columns. `names` stands for the labels of the joints in the robot file: a column is called as the joint, or q_ and the joint,
+    joint.position, tau_joint, joint/effort ...; of q it stands for tau too, where tau is left out.
 
     Attributes
     ----------

@@ -55,6 +55,7 @@ def build(table: RobotFile, *, file: str, sha256: str) -> Robot:
         drives=None if table.drives is None else _drives(table.drives, len(actuated)),
         limits={name: tuple(row) for name in ("q", "qd", "qdd", "tau") if (row := getattr(table.limits, name)) is not None},
         values=table.values,
+        labels=table.labels,
         file=file,
         sha256=sha256,
     )

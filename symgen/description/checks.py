@@ -33,6 +33,7 @@ from symgen.errors import DescriptionError
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}\Z")
 ARGUMENTS = {"q", "qd", "qdd", "tau", "X", "D", "out", "frame", "standard", "np", "pi", "N", "B", "A", "array_namespace", *dir(builtins)}
 MARKS = ("\\", '"""', "*/", "/*", "??/")  # none of which a docstring, a comment of C (the last is \\ there) or LaTeX may meet
+LONGEST_LABEL = 60
 RESERVED = {"CON", "PRN", "AUX", "NUL", *(f"{device}{k}" for device in ("COM", "LPT") for k in range(10))}
 
 
@@ -56,6 +57,27 @@ def check_texts(name: str, texts: Mapping[str, str]) -> None:
                 f"{key} {text[:60]!r}: expected one line of printable text, at most 1000 characters, without \\, triple or final quotes, /*, */ or ??/",
                 path=(key,),
             )
+
+
+def check_labels(labels: Mapping[int, str], frames: Collection[int]) -> None:
+    """Labels name frames that exist, each by another name: one line of printable text that no docstring or comment of emitted files minds."""
+    used: dict[str, int] = {}
+    for j, text in labels.items():
+        if j not in frames:
+            raise DescriptionError(f"labels: frame {j} does not exist; frames are 1 to {len(frames)}", path=("labels", j))
+        if not is_label(text):
+            raise DescriptionError(
+                f"labels.{j}: found {text[:LONGEST_LABEL]!r}; expected 1 to {LONGEST_LABEL} printable characters without \\, quotes, /* or */",
+                path=("labels", j),
+            )
+        if text in used:
+            raise DescriptionError(f"labels.{j}: {text!r} names frame {used[text]} already; names differ", path=("labels", j))
+        used[text] = j
+
+
+def is_label(text: str) -> bool:
+    """Whether `text` may name a joint."""
+    return 0 < len(text) <= LONGEST_LABEL and text.isprintable() and not any(mark in text for mark in (*MARKS, '"', "'"))
 
 
 def check_tree(frames: Sequence[Frame]) -> None:

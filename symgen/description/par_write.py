@@ -106,7 +106,7 @@ def _losses(robot: Robot, written: set[str]) -> tuple[str, ...]:
     notes = []
     if lost := [name for name in robot.parameters if name not in written]:
         notes.append(f"parameters without a place in the format, left out: {', '.join(lost)}")
-    notes += [f"{what} not carried" for what in ("title", "source", "drives", "limits") if getattr(robot, what)]
+    notes += [f"{what} not carried" for what in ("title", "source", "drives", "limits", "labels") if getattr(robot, what)]
     if robot.constants or robot.values or any(loop.start for loop in robot.loops):
         notes.append("numbers of constants, values and start stand in comments, which SYMORO skips and symgen reads")
     return tuple(notes)

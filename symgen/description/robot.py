@@ -94,6 +94,8 @@ class Robot:
         One entry per actuated joint: q as (lower, upper), qd, qdd and tau as largest absolute values.
     values : mapping, SI
         Known standard parameters; never used in the derivation.
+    labels : mapping
+        Names of joints and fixed frames elsewhere (URDF, messages, columns of records), by number; shown, never used in formulas.
     file : str
         Name of the robot file, without its folder.
     sha256 : str
@@ -113,11 +115,12 @@ class Robot:
     drives: Drives | None = None
     limits: Limits = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
+    labels: Mapping[int, str] = field(default_factory=dict)
     file: str = ""
     sha256: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("constants", "constraints", "limits", "values"):
+        for name in ("constants", "constraints", "limits", "values", "labels"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         checks.check_texts(self.name, {"title": self.title, "source": self.source, "file": self.file})
         checks.check_tree(self.frames)
@@ -130,6 +133,7 @@ class Robot:
         if self.drives is not None:
             checks.check_drives(self.drives, len(self.joints))
         checks.check_limits(self.limits, self.joints)
+        checks.check_labels(self.labels, self._by_number)
         checks.check_values(self.name, self.values, self.parameters, self._by_number, self.links)
 
     def __hash__(self) -> int:

@@ -139,6 +139,10 @@ class RobotFile(_Table):
     values: dict[str, Number] = Field(
         default={}, description="standard parameters you know, SI: {M1: 2.0, ZZ1: 0.17}; never used in the derivation"
     )
+    labels: dict[int, str] = Field(
+        default={},
+        description="{1: shoulder_pan, 2: elbow}: names of joints in other programs, shown in tables; `q: names` of a study finds columns by them",
+    )
 
 
 def json_schema() -> dict[str, Any]:

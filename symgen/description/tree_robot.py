@@ -14,6 +14,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from symgen.description.checks import is_label
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.robot import FIXED, INERTIAL, Element, Frame, Robot, parameter
 from symgen.description.tree import Joint, Tree
@@ -72,9 +73,23 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
         massless=massless,
         limits=_limits(table, actuated),
         values=values,
+        labels=_labels(table),
         file=file,
         sha256=sha256,
     )
+
+
+def _labels(table: Table) -> dict[int, str]:
+    """Names of the joints of the file, and of the links that are kept frames, where no joint has the same."""
+    names = {j: joint.name for j, joint in table.joint.items()} | table.kept
+    strange = sorted(name for name in names.values() if not is_label(name))
+    if strange:
+        table.notes.append(f"no label of a robot file, left out: {', '.join(f'{name!a:.60}' for name in strange)}")
+    labels: dict[int, str] = {}
+    for j, name in sorted(names.items()):
+        if is_label(name) and name not in labels.values():
+            labels[j] = name
+    return labels
 
 
 def _identifier(name: str) -> str:

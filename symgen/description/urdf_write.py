@@ -153,7 +153,7 @@ def _losses(robot: Robot, values: Mapping[str, float]) -> tuple[str, ...]:
     gravity = tuple(e.value(robot.constants) for e in robot.gravity)
     if gravity[:2] != (0.0, 0.0) or gravity[2] >= 0:
         notes.append(f"gravity {gravity} m/s^2: a URDF has none, programs assume -z of the root link")
-    notes += [f"{what} not carried" for what in ("title", "source", "drives") if getattr(robot, what)]
+    notes += [f"{what} not carried" for what in ("title", "source", "drives", "labels") if getattr(robot, what)]
     if absent := [key for key in ("q", "qd", "tau") if key not in robot.limits]:
         notes.append(f"no limits of {', '.join(absent)}: written as continuous or {UNLIMITED:g}")
     return tuple(notes)

@@ -40,6 +40,9 @@ def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
     if robot.values:
         lines.append("values:")
     lines += [f"  {name}: {value!r}" for name, value in robot.values.items()]
+    if robot.labels:
+        lines.append("labels:")
+    lines += [f"  {j}: {json.dumps(text, ensure_ascii=False)}" for j, text in robot.labels.items()]
     return "\n".join(lines) + "\n"
 
 

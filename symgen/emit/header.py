@@ -71,8 +71,10 @@ def frame_table(robot: Robot) -> list[str]:
     """The rows of the frame table, aligned; columns that are zero everywhere are left out, except the classical six."""
     kept = informative_columns(robot)
     table = [list(kept), *([str(getattr(f, c)) for c in kept] for f in robot.frames)]
-    widths = [max(len(row[k]) for row in table) for k in range(len(kept))]
-    return ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
+    if robot.labels:
+        table = [[*row, label] for row, label in zip(table, ["label", *(robot.labels.get(f.j, "") for f in robot.frames)], strict=True)]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]
 
 
 def informative_columns(robot: Robot) -> tuple[str, ...]:
@@ -140,6 +142,7 @@ def tables(spec: ModuleSpec, *, numpy: bool = True) -> list[str]:
         f"SOURCE_SHA256 = {robot.sha256!r}",
         f"JOINTS = {robot.joints!r}",
         *([f"PASSIVE = {robot.passive!r}"] if robot.passive else []),
+        *(literal("LABELS", dict(robot.labels)) if robot.labels else []),
         *literal("CONSTANTS", dict(robot.constants)),
         *literal("BASE_PARAMETERS", regrouping.names),
         *literal("STANDARD_PARAMETERS", robot.parameters),

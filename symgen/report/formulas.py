@@ -66,9 +66,7 @@ def mapping(regrouping: Regrouping, certificate: Certificate, only: str | None =
         "count": len(regrouping),
         "standard_count": len(regrouping.robot.parameters),
         "method": regrouping.method,
-        "base_parameters": [
-            {"name": b.name, **b.formula.mapping()} for b in selected(regrouping, only)
-        ],
+        "base_parameters": [{"name": b.name, **b.formula.mapping()} for b in selected(regrouping, only)],
         "no_effect": list(regrouping.no_effect),
         "operations": operations(regrouping),
         "certificate": certificate.mapping(),
@@ -92,9 +90,11 @@ def title(regrouping: Regrouping) -> str:
 
 
 def relation_lines(regrouping: Regrouping) -> list[str]:
-    """The passive joints as functions of others, and an empty line; nothing where there are none."""
+    """Names of the joints, the passive joints as functions of others, and an empty line; nothing where there are none."""
     robot = regrouping.robot
-    return [f"passive: {line}" for line in loop_lines(robot)[len(robot.loops) :]] + [""] if robot.passive else []
+    names = wrapped("frames: " + ", ".join(f"{j} {label}" for j, label in robot.labels.items()), "") if robot.labels else []
+    passive = [f"passive: {line}" for line in loop_lines(robot)[len(robot.loops) :]] if robot.passive else []
+    return [*names, *passive, *([""] if names or passive else [])]
 
 
 def operation_lines(regrouping: Regrouping) -> list[str]:

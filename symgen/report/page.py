@@ -114,7 +114,9 @@ def _frame_rows(robot: Robot) -> dict[str, Any]:
     rows = []
     for f in robot.frames:
         cells = [mathml.math(mathml.expression(x)) if isinstance(x := getattr(f, c), Expression) else str(x) for c in kept[1:]]
-        rows.append({"j": f.j, "cells": cells, "kind": KINDS_OF_JOINT[f.sigma]})
+        rows.append(
+            {"j": f.j, "cells": cells, "kind": ", ".join([KINDS_OF_JOINT[f.sigma], *([robot.labels[f.j]] if f.j in robot.labels else [])])}
+        )
     return {"header": [HEADINGS.get(c, c) for c in kept], "rows": rows}
 
 

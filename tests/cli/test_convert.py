@@ -82,14 +82,41 @@ ARM = """\
 def test_urdf_and_back(tmp_path):
     file, table, again = tmp_path / "arm.urdf", tmp_path / "arm.yaml", tmp_path / "again.urdf"
     file.write_text(ARM)
-    result = run("convert", file, table, "--snap", "1e-4")
+    result = run("convert", file, table)
     assert result.exit_code == 0 and "q1 = 'shoulder', q2 = 'elbow'" in result.stdout and "limits of q left out" in result.stdout
     robot = load_robot(table)
     assert str(robot.frame(2).alpha) == "pi/2" and robot.values["FV1"] == 0.3 and robot.values["M1"] == 2
-    assert str(load_robot(file).frame(2).alpha) == "1.5708"
+    change = "snapped: roll of joint 'elbow' (line 8) from 1.5708 to pi/2, by -3.7e-06 rad"
+    assert change in result.stderr and change not in result.stdout and f"# {change}" in table.read_text()
+    assert load_robot(file).frames == robot.frames and change in run("check", file).stderr
+    result = run("convert", file, tmp_path / "as_it_is.yaml", "--snap", "0")
+    assert "snapped" not in result.stderr and str(load_robot(tmp_path / "as_it_is.yaml").frame(2).alpha) == "1.5708"
+    assert run("convert", file, tmp_path / "no.yaml", "--snap", "most").exit_code == 2
     result = run("convert", table, again)
     assert result.exit_code == 0 and "formulas are not carried" in result.stdout
     assert load_robot(again).values == pytest.approx(robot.values, abs=1e-12)
+
+
+def test_locked_joints_and_chains(tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_text(ARM)
+    result = run("convert", file, tmp_path / "a.yaml", "--lock", "elbow=pi/2")
+    assert result.exit_code == 0 and "held: elbow at 1.5708" in result.stdout and load_robot(tmp_path / "a.yaml").labels == {1: "shoulder"}
+    result = run("convert", file, tmp_path / "b.yaml", "--chain", "base", "a")
+    assert result.exit_code == 0 and "held at zero, their links parts of the bodies that carry them: elbow" in result.stdout
+    result = run("convert", file, tmp_path / "c.yaml", "--chain", "a", "b")
+    assert result.exit_code == 0 and "links left out, since the base of the chain is the ground: base" in result.stdout
+    wrong = {
+        ("--lock", "wrist=0"): "no moving joint of that name",
+        ("--lock", "elbow"): "NAME=NUMBER",
+        ("--chain", "b", "a"): "outward",
+        ("--chain", "a", "tool"): "no link",
+    }
+    for options, words in wrong.items():
+        result = run("convert", file, tmp_path / "d.yaml", *options)
+        assert result.exit_code == 2 and words in result.stderr and not (tmp_path / "d.yaml").exists()
+    result = run("convert", "tx40", tmp_path / "d.yaml", "--lock", "q1=0")
+    assert result.exit_code == 2 and "edit the frames" in result.stderr
 
 
 def test_kept_frames_are_named(tmp_path):

@@ -16,6 +16,7 @@ from runtime.errors import InputError
 from runtime.records.formats.columns import Array, Groups, Table, check_names
 
 QUANTITIES = ("position", "velocity", "effort")
+WORDS = {"q": ("q", "pos", "position"), "tau": ("tau", "torque", "effort"), "qr": ("qr", "reference")}  # beside the name of a joint
 NANOSECONDS = 1_000_000_000  # per second
 
 
@@ -95,6 +96,34 @@ def joint_columns(table: Table, quantity: str, names: Sequence[str]) -> tuple[st
     """Columns of a bag that `names` mean where `quantity` is wanted: of a joint, or names of columns; none: the joints in the order of their numbers."""
     known = {joint: f"{joint}.{quantity}" for joint in table.joints or ()}
     return tuple(known.get(name, name) for name in names or _numbered(table))
+
+
+def named_columns(table: Table, key: str, joints: Sequence[str]) -> tuple[str, ...]:
+    """The column of each joint by its name, alone or beside a word for the quantity: q_elbow, elbow.pos, effort/elbow.
+
+    Parameters
+    ----------
+    table : Table
+        Any table of a record.
+    key : str
+        q, tau or qr.
+    joints : sequence of str
+        Names of the joints.
+
+    Raises
+    ------
+    InputError
+        A joint without column, or with several.
+    """
+    columns = []
+    for joint in joints:
+        forms = {form for word in WORDS[key] for mark in "_./" for form in (f"{joint}{mark}{word}", f"{word}{mark}{joint}")}
+        hits = [name for name in table.names if name in forms] or [name for name in table.names if name == joint]
+        if len(hits) != 1:
+            what = "columns " + ", ".join(hits) if hits else f"no column {joint}, {key}_{joint} or the like among {', '.join(table.names)}"
+            raise InputError(f"{what}; expected one for {joint}, name the columns in record.columns.{key}", file=table.file)
+        columns += hits
+    return tuple(columns)
 
 
 def _numbered(table: Table) -> tuple[str, ...]:
