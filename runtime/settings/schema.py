@@ -82,27 +82,24 @@ Many = Annotated[tuple[T, ...], BeforeValidator(_list), Written(lambda s: {"anyO
 
 
 def require(ok: bool, message: str, *path: str | int) -> None:
-    """SettingsError about the key at `path` of the settings that call this function in their __post_init__."""
+    """SettingsError about the key at `path` unless `ok`; from __post_init__, `path` starts at the settings that call this function."""
     if not ok:
         raise SettingsError(message, path=path)
 
 
 def _odd(value: int) -> int:
-    if value % 2 == 0:
-        raise SettingsError(f"{value}; expected an odd window, 1 for no median filter")
+    require(value % 2 == 1, f"{value}; expected an odd window, 1 for no median filter")
     return value
 
 
 def _in_order(window: tuple[float | None, float | None]) -> tuple[float | None, float | None]:
     t0, t1 = window
-    if t0 is not None and t1 is not None and not t0 < t1:
-        raise SettingsError(f"[{t0}, {t1}]; expected the earlier time first")
+    require(t0 is None or t1 is None or t0 < t1, f"[{t0}, {t1}]; expected the earlier time first")
     return window
 
 
 def _not_one(runs: int) -> int:
-    if runs == 1:
-        raise SettingsError("1 run; expected 0 or at least 2")
+    require(runs != 1, "1 run; expected 0 or at least 2")
     return runs
 
 

@@ -18,7 +18,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from runtime.errors import SettingsError
 from runtime.settings.controller import Controller
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.record import SHORTEST, Columns, Records, RecordSettings, Resample, Scale, Units
@@ -49,8 +48,7 @@ LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 
 def version(number: int) -> int:
     """The version of a study file or fleet file; SettingsError where it is not SCHEMA."""
-    if number != SCHEMA:
-        raise SettingsError(f"schema {number}; this version reads {SCHEMA}")
+    require(number == SCHEMA, f"schema {number}; this version reads {SCHEMA}")
     return number
 
 
