@@ -4,53 +4,21 @@
 it is installed. None of their text is in this repository.
 """
 
-import sysconfig
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from oracles.test_urdf_agrees import Pinocchio, kept_frames, legend, pose_difference
-from symgen.derive.float_algebra import FloatAlgebra
-from symgen.derive.geometry import Geometry
-from symgen.derive.loops import close
-from symgen.derive.newton_euler import Motion, joint_torques
-from symgen.description import Robot
-from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
-from symgen.description.urdf import parse_urdf, read_urdf
+from oracles.test_urdf_agrees import kept_frames, legend, pose_difference
+from oracles.urdf_table import FOUND, difference, snapped_text
+from symgen.description.files import SNAP
+from symgen.description.urdf import SNAPPED, parse_urdf, read_urdf
 from symgen.description.urdf_write import write_urdf
+from symgen.emit.certified import certify
 from symgen.errors import DescriptionError
+from symgen.regroup.regrouping import regroup
 
-SITE = Path(sysconfig.get_paths()["purelib"])
-FOLDERS = ("airo_models", "cmeel.prefix/share/example-robot-data/robots")
-MOVES = ('type="revolute"', 'type="prismatic"', 'type="continuous"')
-FOUND = sorted(p for folder in FOLDERS for p in (SITE / folder).rglob("*.urdf") if any(word in p.read_text("utf-8") for word in MOVES))
 REFUSED = {"alex_psyonic_hands": "no moving joint 'index_q1' to follow"}
 POSE = 5e-12  # angles within 1e-12 of a multiple of pi/12 are taken as that: files say 1.570796326795
-
-
-def open_tree(robot: Robot) -> Robot:
-    """The mechanism with every joint its own and nothing but its links."""
-    values = {name: robot.values[name] for j in robot.links for p in INERTIAL if (name := parameter(p, j)) in robot.values}
-    frames = tuple(replace(f, mu=int(f.sigma != FIXED)) for f in robot.frames)
-    return replace(robot, frames=frames, constraints={}, elements=(), limits={}, values=values)
-
-
-def difference(text: str, robot: Robot, names: dict[int, str]) -> float:
-    """Largest difference of torque over the largest torque, every joint on its own, whatever follows what."""
-    tree, rng = open_tree(robot), np.random.default_rng(7)
-    reach = np.array([1.0 if f.sigma == PRISMATIC else np.pi for f in tree.frames if f.sigma != FIXED])
-    oracle, closure, largest, error = Pinocchio(text), close(tree), 0.0, 0.0
-    for _ in range(3):
-        x = rng.standard_normal((3, len(reach)))
-        x[0] = rng.uniform(-1, 1, len(reach)) * reach
-        theirs = oracle.torque([names[j] for j in tree.joints], *x)
-        states = [{j: np.array(v) for j, v in zip(tree.joints, row, strict=True)} for row in x]
-        gamma = joint_torques(Motion(Geometry(tree, FloatAlgebra(tree, *states), closure)), dict(tree.values))
-        ours = np.array([float(gamma[j]) for j in tree.joints])
-        largest, error = max(largest, np.abs(theirs).max()), max(error, np.abs(ours - theirs).max())
-    return error / largest if largest else error
 
 
 @pytest.mark.skipif(not FOUND, reason="no package with URDF files: pip install symgen[test]")
@@ -77,3 +45,30 @@ def test_torques_frames_and_round_trip(path: Path) -> None:
         assert difference(again, found, {j: f"q{j}" for j in found.moving}) < 1e-10
         back, of = read_urdf(again.encode(), "again.urdf")
         assert difference(again, back, legend(of)) < 1e-10
+
+
+@pytest.mark.parametrize("path", FOUND, ids=lambda p: p.stem)
+def test_torques_with_snapped_angles(path: Path) -> None:
+    """The default: angles within SNAP of a multiple of pi/12 are that; the same text with such angles moves alike."""
+    if path.stem in REFUSED:
+        pytest.skip(REFUSED[path.stem])
+    text = path.read_text("utf-8")
+    robot, notes = read_urdf(text.encode(), path.name, nearly=SNAP)
+    assert any(note.startswith(SNAPPED) for note in notes) or robot.frames == read_urdf(text.encode(), path.name)[0].frames
+    assert not robot.values or difference(snapped_text(text), robot, legend(notes)) < 1e-9
+
+
+def certified(path: Path) -> None:
+    certificate = certify(regroup(read_urdf(path.read_bytes(), path.name, nearly=SNAP)[0]))
+    assert certificate.valid, str(certificate)
+
+
+@pytest.mark.parametrize("path", [p for p in FOUND if len(p.read_text("utf-8")) < 40_000 and p.stem not in REFUSED], ids=lambda p: p.stem)
+def test_small_robots_are_certified(path: Path) -> None:
+    certified(path)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("path", [p for p in FOUND if p.stem not in REFUSED], ids=lambda p: p.stem)
+def test_every_robot_is_certified(path: Path) -> None:
+    certified(path)
