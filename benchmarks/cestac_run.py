@@ -63,7 +63,9 @@ def task_of(model: GeneratedModel, record: Record, study: Study, names: tuple[st
     """What every run of the study needs."""
     study = replace(study, cestac=replace(study.cestac, median=1))
     drives = Drives.from_mapping(model.DRIVES) if model.DRIVES else None
-    return Task((prepared(record, study),), model, names, replace(study.estimate, columns="all"), study.cestac, levels_of(study.cestac), drives, {})
+    return Task(
+        (prepared(record, study),), model, names, replace(study.estimate, columns="all"), study.cestac, levels_of(study.cestac), drives, {}
+    )
 
 
 def plain_run(task: Task, key: tuple[int, int]) -> Array:

@@ -31,9 +31,9 @@ from matplotlib.ticker import NullFormatter
 from simulation import LAW
 
 from runtime import InputError, load_model
-from runtime.estimators.methods import estimate_of
 from runtime.estimators.closed_loop import ClosedLoop, closed_loop
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import estimate_of
 from runtime.model.generated import GeneratedModel
 from runtime.motion.reference import Reference, reference_of
 from runtime.motion.simulation import Simulator, parameters_of

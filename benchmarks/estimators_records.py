@@ -25,9 +25,9 @@ from simulation import LAW
 
 from runtime import load_model
 from runtime.errors import InputError
-from runtime.estimators.methods import estimate_of
 from runtime.estimators.closed_loop import closed_loop
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import estimate_of
 from runtime.model.generated import GeneratedModel
 from runtime.motion.reference import Reference
 from runtime.motion.simulation import Simulator

@@ -36,8 +36,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 
-from runtime.estimators.methods import estimate_of
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import estimate_of
 from runtime.files import read_bytes
 from runtime.model.compiled import compiled_model
 from runtime.model.generated import GeneratedModel, load_model

@@ -31,8 +31,8 @@ from rounds import interleave, processor, ratio
 
 from symgen.derive.loops import close
 from symgen.description import load_robot
-from symgen.emit.printers import Text
 from symgen.emit.numpy_target import render
+from symgen.emit.printers import Text
 from symgen.emit.spec import ModuleSpec, inverse_dynamics, is_inertial, is_inertial_or_actuator, module_spec, regressor_program
 from symgen.regroup.regrouping import regroup
 

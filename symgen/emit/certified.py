@@ -128,7 +128,7 @@ def module_errors(module: ModuleType, regrouping: Regrouping) -> dict[str, float
     one-sided friction takes in a constant force, which the module leaves out at rest and says so.
     """
     robot = regrouping.robot
-    witness, _, _ = independent(robot)
+    witness = independent(robot)
     chi = np.random.default_rng(6).standard_normal(len(robot.parameters))
     own = [robot.parameters.index(name) for name in regrouping.own]
     X, q, qd = module.base_parameters(chi), witness.q[:STATES], witness.qd[:STATES]

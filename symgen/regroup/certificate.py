@@ -171,7 +171,9 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
         The loops close in too few random states.
     """
     robot = regrouping.robot
-    witness, rank, gap = independent(robot)
+    witness = independent(robot)
+    acting = [c for c, name in enumerate(robot.parameters) if name not in regrouping.no_effect]
+    rank, gap = numeric_rank(witness.W[:, acting])
     base = [robot.parameters.index(own) for own in regrouping.own]
     bound = 2 * degree(regrouping) / 2**30
     draws = 2
@@ -296,12 +298,11 @@ def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[
 
 
 @lru_cache(maxsize=4)
-def independent(robot: Robot) -> tuple[Sample, int, float]:
-    """The regressor by energies at random states of `robot`, its numeric rank and gap; kept for further certificates of the robot."""
+def independent(robot: Robot) -> Sample:
+    """The regressor by energies at random states of `robot`, kept for further certificates of the robot."""
     from symgen.derive.lagrange import in_one_mode, sampled  # CasADi, which nothing else of this room needs
 
-    witness = sampled(in_one_mode(robot), 3 * len(robot.parameters) // len(robot.joints) + 10, seed=5)
-    return witness, *numeric_rank(witness.W)
+    return sampled(in_one_mode(robot), 3 * len(robot.parameters) // len(robot.joints) + 10, seed=5)
 
 
 def base_values(regrouping: Regrouping, chi: Array) -> Array:
@@ -314,7 +315,7 @@ def base_values(regrouping: Regrouping, chi: Array) -> Array:
 def numeric_rank(W: Array, *, tolerance: float = 1e-9) -> tuple[int, float]:
     """Rank of a float matrix by SVD after scaling its columns, and the gap s_rank / s_(rank+1)."""
     norms = np.linalg.norm(W, axis=0)
-    acts = norms > 1e-12 * norms.max(initial=0.0)  # below: rounding of a column without effect
+    acts = norms > 1e-12 * np.median(norms[norms > 0]) if norms.any() else norms > 0  # below: rounding of a column without effect
     s = np.linalg.svd(W[:, acts] / norms[acts], compute_uv=False)
     rank = int(np.sum(s > tolerance * s[0]))
     gap = float(s[rank - 1] / max(s[rank], np.finfo(float).tiny)) if rank < s.size else float("inf")

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from campaign import campaign
 import typer
+from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime.resolution.checkpoint import Checkpoint

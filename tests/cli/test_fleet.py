@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign import campaign
 import typer
+from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime.model.generated import load_model

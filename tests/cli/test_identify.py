@@ -6,8 +6,8 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from campaign import campaign
 import typer
+from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime.estimators.estimate import Estimate

@@ -89,7 +89,10 @@ def test_errors_of_records_add_up(folder, monkeypatch):
     reduction = observe(model, streams, study)
     fit = essential_of(reduction, study.essential, study.estimate, model=model).all_parameters
     parts = record_errors(reduction, fit, [stream.name for stream in streams])
-    sizes = [np.linalg.norm(np.concatenate([j.R[:, -1] for s in reduction.reduced.segments if s.record == k for j in s.joints])) for k in range(3)]
+    sizes = [
+        np.linalg.norm(np.concatenate([j.R[:, -1] for s in reduction.reduced.segments if s.record == k for j in s.joints]))
+        for k in range(3)
+    ]
     total = np.sqrt(sum((part.relative_error / 100 * size) ** 2 for part, size in zip(parts, sizes, strict=True)))
     assert total == pytest.approx(fit.residual_norm, rel=1e-10)
 

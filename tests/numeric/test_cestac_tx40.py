@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.estimators.methods import estimate_of
 from runtime.estimators.essential import essential_of
+from runtime.estimators.methods import estimate_of
 from runtime.identification.validation import split_validation
 from runtime.model.generated import load_model
 from runtime.observation.observation import observe

@@ -11,9 +11,9 @@ import pytest
 
 from runtime import InputError, load_model
 from runtime.errors import SettingsError
-from runtime.estimators.methods import estimate_of
 from runtime.estimators import fixed_point as iteration
 from runtime.estimators.closed_loop import closed_loop, slips, slowest
+from runtime.estimators.methods import estimate_of
 from runtime.motion.reference import Reference, reference_of
 from runtime.motion.simulation import Simulator, parameters_of
 from runtime.observation.observation import observe

@@ -12,8 +12,8 @@ import typer
 from planar_data import record
 from typer.testing import CliRunner
 
-from runtime.parallel import results
 from runtime.errors import InputError
+from runtime.parallel import results
 from runtime.resolution.cestac import cestac
 from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
 from symgen.cli.fleet import fleet

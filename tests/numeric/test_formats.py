@@ -12,9 +12,9 @@ import h5py
 import numpy as np
 import polars
 import pytest
-from campaign import sampled
 import scipy.io
 from bag_files import joint_states, write_bag
+from campaign import sampled
 
 from runtime import load_model, observe
 from runtime.estimators.essential import essential_of

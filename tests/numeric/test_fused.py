@@ -18,7 +18,7 @@ from runtime.model.compile_cache import NotCompiledError, cache_folder
 from runtime.model.compiled import CompiledModel
 from runtime.observation.filters import filtered_states, kept_samples
 from runtime.resolution.c import kernels as fused
-from runtime.resolution.c.kernels import SignalEntries, FilteredStates, Room, constant_values, decimated
+from runtime.resolution.c.kernels import FilteredStates, Room, SignalEntries, constant_values, decimated
 from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.self_test import unavailable
 from runtime.settings.study import Decimate, Lowpass, Signals
