@@ -215,7 +215,8 @@ def test_corpus(path, tmp_path):
         case _:
             command = ("identify", "model.py", file)
     code, said = answered(*command)
-    assert code == 0 or (code == 2 and said[:-1].isprintable()), said
+    refuted = code == 1 and "say --at-values" in said  # a valid file, at whose constants the generic formulas do not hold
+    assert code == 0 or refuted or (code == 2 and said[:-1].isprintable()), said
 
 
 def symgen(*arguments, **settings):
