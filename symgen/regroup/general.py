@@ -40,7 +40,7 @@ from symgen.regroup.finite_field import rref, small_rational
 
 INDEPENDENT = 1e-7  # of a unit column: what the columns before it leave of an independent one
 SPREAD, MOST_STATES = 0.4, 4000  # rad about the start, and of half the longest length for slides
-DEGREES = tuple((q, more) for more in range(3) for q in range(4))  # degree of Q, and of what P has beyond it where the unit leaves it open
+DEGREES = range(4)  # of Q; units then fix the degree of every P
 MAX_UNKNOWNS = 1200
 
 Length = str | Number | Call
@@ -286,7 +286,7 @@ def relation(robot: Robot, name: str, support: tuple[str, ...]) -> dict[str, Exp
     except ArithmeticError:
         return None
     own = length_degree(robot, name)
-    for degree, _ in DEGREES[:4]:
+    for degree in DEGREES:
         products = {k: _products(draw.lengths, degree + length_degree(robot, k) - own) for k in support}
         Q = _products(draw.lengths, degree)
         width = len(Q) + sum(map(len, products.values()))
