@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from io import TextIOWrapper
+from functools import cached_property
+from io import StringIO, TextIOWrapper
 from itertools import islice
 
 import numpy as np
@@ -16,13 +17,15 @@ from runtime.files import opened
 from runtime.records.formats.columns import WIDEST, Array, Groups, Source, Table
 
 LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits each
+HELD = 2**25  # characters of a file whose numbers are all kept: they are read once
 MOST_EMPTY = 5_000_000  # lines without a number
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
 
 
 @dataclass(eq=False, kw_only=True)
 class TextTable(Table):
-    """Lines of a text file; each is turned into numbers when its block is read."""
+    """Lines of a text file. A file of at most HELD characters that holds nothing but numbers under its header is read at once, by NumPy alone;
+    of any other each line is turned into numbers when its block is read, and what is wrong with it is told by line and column."""
 
     what = "a text file"
 
@@ -32,13 +35,17 @@ class TextTable(Table):
 
     def samples(self, groups: Groups) -> int:
         self.require([name for group in groups for name in group])
-        count = sum(1 for _ in self._lines())
+        count = sum(1 for _ in self._lines()) if self._numbers is None else len(self._numbers)
         if not count:
             raise InputError(f"no line of numbers under the header {', '.join(self.names)}", file=self.file)
         return count
 
     def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
         indices = [self.names.index(name) for name in names]
+        if self._numbers is not None:
+            for first in range(0, len(self._numbers), size):
+                yield list(self._numbers[first : first + size, indices].T)
+            return
         lines = self._lines()
         while block := list(islice(lines, size)):
             numbers, texts = zip(*block, strict=True)
@@ -48,6 +55,20 @@ class TextTable(Table):
                 yield list(np.loadtxt(plain, delimiter=self.delimiter, usecols=indices, ndmin=2, comments=None, quotechar='"').T)
             except ValueError:
                 raise self._not_a_number(indices, numbers, plain) from None
+
+    @cached_property
+    def _numbers(self) -> Array | None:
+        """Every column, shape (N, len(names)); None where the file is long, or something in it is neither a number nor the header."""
+        try:
+            with opened(self.source.path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
+                whole = text.read(HELD + 1).lstrip()
+            lines = whole.partition("\n")[2] if self.has_header else whole
+            if len(whole) > HELD or "#" in whole or self.source.decimal != "." or not lines.strip():
+                return None
+            numbers = np.loadtxt(StringIO(lines), delimiter=self.delimiter, ndmin=2, comments=None, quotechar='"')
+        except ValueError:  # the file is read again by lines, which tells where
+            return None
+        return numbers if numbers.shape[1] == len(self.names) else None
 
     def row(self, i: int) -> str:
         return f"line {next(islice(self._lines(), i, None))[0]}"

@@ -1,0 +1,57 @@
+"""Text files: numbers are parsed once, and the quick way and the way by lines give the same bits and the same words."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from runtime import InputError, read_record
+from runtime.records.formats import text
+
+rng = np.random.default_rng(3)
+
+
+def written(path: Path, lines: list[str]) -> Path:
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def sampled_lines(N: int = 400) -> list[str]:
+    t = np.arange(N) / 100
+    rows = np.column_stack([t, np.sin(t), rng.normal(size=N) * 10.0 ** rng.integers(-12, 12, N)])
+    return ["t,q1,tau1", *(",".join(map(repr, row)) for row in rows.tolist())]
+
+
+def test_numbers_of_a_file_are_parsed_once(tmp_path, monkeypatch):
+    path, calls = written(tmp_path / "run.csv", sampled_lines()), []
+    parse = np.loadtxt
+    monkeypatch.setattr(np, "loadtxt", lambda *args, **named: calls.append(1) or parse(*args, **named))
+    monkeypatch.setattr(text.TextTable, "_lines", lambda self: pytest.fail("the file is read again by lines"))
+    read_record(path)
+    assert len(calls) == 1
+
+
+def test_both_ways_give_the_same_bits(tmp_path, monkeypatch):
+    lines = sampled_lines()
+    plain = read_record(written(tmp_path / "plain.csv", lines))
+    by_lines = read_record(written(tmp_path / "commented.csv", [*lines[:7], "# a comment", "", *lines[7:]]))
+    monkeypatch.setattr(text, "HELD", 1000)
+    long = read_record(tmp_path / "plain.csv")
+    for other in (by_lines, long):
+        assert other.q.tobytes() == plain.q.tobytes() and other.tau.tobytes() == plain.tau.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda line: line + ",7", "line 5: 4 fields; expected 3"),
+        (lambda line: line.rsplit(",", 1)[0] + ",x", "line 5: 'x'; expected a number"),
+        (lambda line: line.rsplit(",", 1)[0] + ",", "line 5: an empty field"),
+    ],
+)
+def test_what_is_wrong_is_told_by_line(tmp_path, damage, words):
+    lines = sampled_lines()
+    lines[4] = damage(lines[4])
+    with pytest.raises(InputError) as e:
+        read_record(written(tmp_path / "run.csv", lines))
+    assert all(word in str(e.value) for word in words.split(": "))
