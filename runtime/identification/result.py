@@ -132,9 +132,10 @@ class Identification:
 
     @property
     def time_stamps(self) -> tuple[str, ...]:
-        """What the time stamps of the records were like, those of one file once."""
+        """What the time stamps of the records were like, those of one file once, and the known torques that were subtracted."""
         texts = {(record.name.split(" (")[0], text): None for record in self.records if (text := getattr(record, "time", ""))}
-        return tuple(f"Time stamps of {name}: {text}." for name, text in texts)
+        known = [f"{record.name}: {text}." for record in self.records if (text := getattr(record, "known", ""))]
+        return (*(f"Time stamps of {name}: {text}." for name, text in texts), *known)
 
     @property
     def prediction_error(self) -> float:

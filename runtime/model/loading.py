@@ -33,6 +33,11 @@ def module_of(path: Path) -> ModuleType:
     except (OSError, UnicodeDecodeError) as e:
         raise ModelError(f"cannot be read: {e}", file=str(path)) from e
     check_source(text, path.name)
+    return run(text, path)
+
+
+def run(text: str, path: Path) -> ModuleType:
+    """The module of a text that has been checked; `path` is where it stands."""
     name = f"generated_{path.stem}"
     loader = _Checked(text)
     module = importlib.util.module_from_spec(ModuleSpec(name, loader, origin=str(path)))

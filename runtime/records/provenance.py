@@ -30,4 +30,6 @@ def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
     simulated = any(record.name.startswith(SIMULATED) for record in records)
     note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
     stamps = {name: text for name, record in zip(names, records, strict=True) if (text := getattr(record, "time", ""))}
-    return {"records": list(names), "simulated": simulated, **({"time": stamps} if stamps else {}), **note}
+    known = {name: text for name, record in zip(names, records, strict=True) if (text := getattr(record, "known", ""))}
+    said = {"time": stamps, "known_torques": known}
+    return {"records": list(names), "simulated": simulated, **{key: texts for key, texts in said.items() if texts}, **note}

@@ -21,6 +21,7 @@ from runtime.estimators.methods import linear_system
 from runtime.estimators.normal_equations import LeastSquares, least_squares
 from runtime.model.compiled import CompiledModel
 from runtime.model.generated import GeneratedModel, ModelText
+from runtime.model.narrowing import narrowed
 from runtime.observation.filters import States, decimation_plan, filtered_states
 from runtime.observation.regressor_signals import DecimatedSignals, distinct_entries
 from runtime.resolution.c.workspace import CompiledWorkspace
@@ -58,6 +59,8 @@ class NumpyWorkspace:
         self.task, self.model = task, model
         numbers = np.array([model.BASE_PARAMETERS.index(name) for name in task.names], dtype=int)
         self.entries = distinct_entries(model, task.constants, numbers)
+        source = self.entries.source
+        self.narrowed = narrowed(model, set(zip(self.entries.k[source].tolist(), self.entries.j[source].tolist(), strict=True)))
         self.by_joint = [np.flatnonzero(self.entries.j == j) for j in range(len(model.JOINTS))]
         self.columns = [self.entries.row[own] for own in self.by_joint]
         self.records = [RecordWorkspace(self, record) for record in task.records]
@@ -75,7 +78,7 @@ class RecordWorkspace:
         self.work, self.record, self.selection = work, record, record.selection
         task, samples = work.task, record.selection.samples
         plan = decimation_plan(samples.stop - samples.start, self.selection.factor, self.selection.signals.decimate)
-        self.signals = DecimatedSignals(work.model, work.entries, task.constants, plan)
+        self.signals = DecimatedSignals(work.narrowed, work.entries, task.constants, plan)
         self.q = np.asfortranarray(record.q)
         self.kept = [np.flatnonzero(mask) for mask in self.selection.mask]
         self.filtered = filtered_states(self.q, record.rate, self.selection.signals)

@@ -100,7 +100,7 @@ class Signals(Settings):
     Attributes
     ----------
     median : int
-        Window of the median filter, odd number of samples; 1 switches it off.
+        Window of the median filter on positions and torques, odd number of samples; 1 switches it off.
     lowpass : Lowpass or None
         Low-pass filter; null switches it off.
     ends : str

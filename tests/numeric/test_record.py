@@ -486,7 +486,7 @@ def test_different_lengths(tmp_path):
         read_record(settings(files="a.npz", rate=RATE), folder=tmp_path)
 
 
-def test_samples_along_the_first_axis(tmp_path):
+def test_samples_run_along_the_longer_side(tmp_path):
     np.savez(tmp_path / "a.npz", q=Q.T, tau=TAU.T)
     with pytest.raises(InputError, match="samples along the first axis"):
         read_record(settings(files="a.npz", rate=RATE, columns={"q": "q", "tau": "tau"}), folder=tmp_path)
