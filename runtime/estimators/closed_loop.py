@@ -180,14 +180,14 @@ def closed_loop(
     for k, record in enumerate(records):
         rate = controller.rate / controller.record_every
         if abs(record.rate / rate - 1) > 1e-3:
-            raise SettingsError(f"{record.name} at {record.rate:g} Hz, recorded every {controller.record_every} ticks of {controller.rate:g} Hz; expected the same",
+            raise SettingsError(f"{record.file} at {record.rate:g} Hz, recorded every {controller.record_every} ticks of {controller.rate:g} Hz; expected the same",
                                 path=("controller", "rate"))  # fmt: skip
         followed = _reference(model, records, k, controller, study, reference)
         every = controller.record_every
         if len(followed) // every + (len(followed) % every > 0) < len(record):
             raise InputError(
                 f"the reference ends after {len(followed) / controller.rate:g} s, the record after {record.t[-1] - record.t[0]:g} s",
-                file=record.name,
+                file=record.file,
             )
         wanted = slowest(slips(followed.qd[::every][: len(record)], simulator.friction.G), round(around * rate))
         selection = select_rows(
@@ -212,7 +212,7 @@ def _reference(model: GeneratedModel, records: Sequence[Record], k: int, control
     given = controller.reference
     if all(getattr(given, name) is None for name in ("file", "motion", "points", "record")):
         raise SettingsError(
-            f"what the controller followed in {record.name} is not known; give columns qr1 ... (record.columns.qr) or controller.reference, or say "
+            f"what the controller followed in {record.file} is not known; give columns qr1 ... (record.columns.qr) or controller.reference, or say "
             "estimate.options.reference: measured",
             path=("controller", "reference"),
         )

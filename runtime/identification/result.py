@@ -23,7 +23,7 @@ from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import Observation
 from runtime.records.provenance import record_names
-from runtime.records.record import Record
+from runtime.records.record import UNNAMED, Record
 from runtime.records.stream import Stream
 from runtime.resolution.advice import Advice
 from runtime.resolution.result import Cestac
@@ -97,6 +97,11 @@ class Identification:
     def name(self) -> str:
         """Names of the records."""
         return ", ".join(record_names(self.records))
+
+    @property
+    def _of_record(self) -> str:
+        """The record by its name, in a sentence; one without a name is "record" alone."""
+        return "record" if self.name == UNNAMED else f"record{'s' if len(self.records) > 1 else ''} {self.name}"
 
     @property
     def source(self) -> Literal["measured", "simulated"]:
@@ -182,7 +187,7 @@ class Identification:
         if not self.determined:
             names = "; ".join(", ".join(group) for group in self.estimate.groups)
             return (
-                f"The record {self.name} does not determine {self.model.NAME}: rank {self.estimate.rank} for {len(self.estimate.names)} "
+                f"The {self._of_record} does not determine {self.model.NAME}: rank {self.estimate.rank} for {len(self.estimate.names)} "
                 f"parameters, cannot be told apart: {names}."
             )
         fit = self.model_estimate
@@ -190,7 +195,7 @@ class Identification:
         by_joint = f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)" if self.observation.n > 1 else ""
         return (
             f"{len(fit.names)} of {len(self.estimate.names)} parameters carry the model of {self.model.NAME}: they leave {fit.relative_error:.1f} % "
-            f"of the torques of the record {self.name} unexplained{by_joint}, and {self.prediction_error:.1f} % of a part that the fit has not seen."
+            f"of the torques of the {self._of_record} unexplained{by_joint}, and {self.prediction_error:.1f} % of a part that the fit has not seen."
         )
 
     @property

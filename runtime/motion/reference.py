@@ -144,10 +144,10 @@ def _of_record(records: Sequence[Record], index: int, rate: float) -> Reference:
     record = records[index]
     if record.q_r is None:
         raise SettingsError(
-            f"{record.name} holds no reference; name its columns in record.columns.qr", path=("controller", "reference", "record")
+            f"{record.file} holds no reference; name its columns in record.columns.qr", path=("controller", "reference", "record")
         )
     if abs(record.rate / rate - 1) > RATE_TOLERANCE:
-        raise SettingsError(f"{record.name} runs at {record.rate:g} Hz, the controller at {rate:g} Hz", path=("controller", "rate"))
+        raise SettingsError(f"{record.file} runs at {record.rate:g} Hz, the controller at {rate:g} Hz", path=("controller", "rate"))
     return Reference.sampled(record.q_r, rate)
 
 

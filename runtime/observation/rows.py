@@ -47,7 +47,7 @@ def select_rows(record: Record, qd: Array, signals: Signals, rows: Rows, *, keep
         raise InputError(
             f"{len(kept)} rows per joint after decimation by {factor}, of which rows.trim leaves out {2 * rows.trim}; "
             "use a longer record or window, or a smaller rows.trim",
-            file=record.name,
+            file=record.file,
         )
     mask = np.ones((record.n, len(kept)), dtype=bool)
     dropped = {}
@@ -60,7 +60,7 @@ def select_rows(record: Record, qd: Array, signals: Signals, rows: Rows, *, keep
         mask &= usable
         dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
     if not mask.any():
-        raise InputError(f"no row is left: {dropped} rows per joint were left out of {len(kept)}", file=record.name)
+        raise InputError(f"no row is left: {dropped} rows per joint were left out of {len(kept)}", file=record.file)
     return Selection(samples, kept, mask, factor, record.t[instants], record.rate / factor, signals, rows, dropped)
 
 
@@ -71,7 +71,7 @@ def _window(record: Record, rows: Rows) -> slice:
     stop = len(record) if t1 is None else int(np.searchsorted(record.t, t1, side="right"))
     if stop <= start:
         raise InputError(
-            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{record.t[0]:g}, {record.t[-1]:g}] s", file=record.name
+            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{record.t[0]:g}, {record.t[-1]:g}] s", file=record.file
         )
     return slice(start, stop)
 
@@ -84,7 +84,7 @@ def _untrimmed(K: int, trim: int) -> Array:
 def _keep(keep: Array, record: Record) -> Array:
     keep = keep[:, None] if keep.ndim == 1 else keep
     if keep.dtype != np.bool_ or keep.shape not in {(len(record), 1), (len(record), record.n)}:
-        raise InputError(f"keep {keep.dtype} {keep.shape}; expected bool {(len(record),)} or {(len(record), record.n)}", file=record.name)
+        raise InputError(f"keep {keep.dtype} {keep.shape}; expected bool {(len(record),)} or {(len(record), record.n)}", file=record.file)
     return keep
 
 

@@ -72,7 +72,7 @@ def column_names(settings: RecordSettings, first: Table, last: Table, joints: Se
         )
     if not {*of_q} <= {*first.names} and {*of_q} <= {*last.names} and {*of_tau} <= {*first.names}:
         raise InputError(f"{first.file} holds the torques and {last.file} the positions; `files` are the positions, then the torques")
-    return Columns(t, of_q, of_tau, qr)
+    return Columns(t, of_q, of_tau, qr, given.tau_ff, given.tau_known)
 
 
 def _meant(table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]) -> tuple[str, ...]:

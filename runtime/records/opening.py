@@ -7,20 +7,54 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from runtime.errors import InputError, ModelError
 from runtime.model.drives import Drives
 from runtime.records.clock import Stamps
-from runtime.records.formats.columns import Array, Groups, Table
+from runtime.records.formats.columns import Array, Table
 from runtime.records.formats.table import open_table
 from runtime.records.joint_side import Conversion, column_names, conversion, require_alike, require_finite
 from runtime.records.labels import Label
-from runtime.settings.record import SHORTEST, Columns, RecordSettings
+from runtime.settings.record import NONE, SHORTEST, Columns, RecordSettings
 from runtime.settings.units import time_unit
+
+QUANTITIES = ("t", "q", "q_r", "tau", "tau_ff", "tau_known")
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples of a record, joint side, SI; None: the files hold no such columns.
+
+    Attributes
+    ----------
+    t : ndarray, shape (N,), s, or None
+    q : ndarray, shape (N, n), rad or m
+    tau : ndarray, shape (N, n), N m or N
+        As measured, known torques included.
+    q_r : ndarray, shape (N, n), rad or m, or None
+        Reference.
+    tau_ff, tau_known : ndarray, shape (N, n), N m or N, or None
+        Feed-forward torques of the controller, and torques that do not come from the model.
+    """
+
+    t: Array | None
+    q: Array
+    tau: Array
+    q_r: Array | None = None
+    tau_ff: Array | None = None
+    tau_known: Array | None = None
+
+    @property
+    def signals(self) -> dict[str, Array]:
+        """What is resampled together, by name."""
+        given = {key: getattr(self, key) for key in ("q", "tau", "q_r", "tau_ff", "tau_known")}
+        return {key: x for key, x in given.items() if x is not None}
 
 
 @dataclass(frozen=True, eq=False)
 class RecordFiles:
-    """One or two measured files: positions, time and reference in the first, torques in the last.
+    """Measured files: positions, time and reference in one, torques in the same or another, known torques in one of these or in a third.
 
     Attributes
     ----------
@@ -30,8 +64,8 @@ class RecordFiles:
         Of the record.
     hashes : mapping of str to str
         SHA-256 by file.
-    tables : tuple of Table
-        The files.
+    tables : tuple of 3 Table
+        The files of the positions, of the torques, of the known torques; one file may stand for several.
     columns : Columns
         Names of the columns.
     samples : int
@@ -45,7 +79,7 @@ class RecordFiles:
     settings: RecordSettings
     name: str
     hashes: Mapping[str, str]
-    tables: tuple[Table, ...]
+    tables: tuple[Table, Table, Table]
     columns: Columns
     samples: int
     n: int
@@ -61,40 +95,50 @@ class RecordFiles:
         """How messages name the time stamps, and what they must be."""
         return Stamps(self.first.file, self.columns.t, self.first.row, self.settings.rate, self.settings.jitter)
 
-    def read(self) -> tuple[Array, Array, Array, Array]:
-        """t (N, 1) or (N, 0), q (N, n), tau (N, n), q_r (N, n) or (N, 0), joint side, SI."""
-        groups, torques = _groups(self.columns, len(self.tables))
-        arrays = self.first.read(groups, self.samples)
-        return self._converted(0, *arrays, *(self.tables[1].read(torques, self.samples) if torques else ()))
+    def read(self) -> Samples:
+        """All samples, joint side, SI."""
+        parts: dict[str, Array] = {}
+        for table, groups in groups_of(self.columns, self.tables):
+            parts |= zip(groups, table.read(list(groups.values()), self.samples), strict=True)
+        return self._converted(0, parts)
 
-    def blocks(self, size: int) -> Iterator[tuple[Array, Array, Array, Array]]:
+    def blocks(self, size: int) -> Iterator[Samples]:
         """The same by blocks of `size` samples."""
-        groups, torques = _groups(self.columns, len(self.tables))
-        blocks = self.first.blocks(groups, size)
-        others: Iterator[tuple[Array, ...]] = self.tables[1].blocks(torques, size) if torques else iter(())
-        for a, block in zip(range(0, self.samples, size), blocks, strict=True):
-            yield self._converted(a, *block, *(next(others) if torques else ()))
+        asked = groups_of(self.columns, self.tables)
+        streams = [table.blocks(list(groups.values()), size) for table, groups in asked]
+        keys = [key for _, groups in asked for key in groups]
+        for a, blocks in zip(range(0, self.samples, size), zip(*streams, strict=True), strict=True):
+            yield self._converted(a, dict(zip(keys, (x for block in blocks for x in block), strict=True)))
 
     def times(self, size: int) -> Iterator[Array]:
         """t by blocks of `size` samples, s; the record has a time column."""
         for a, (t,) in zip(range(0, self.samples, size), self.first.blocks([[self.columns.t or ""]], size), strict=True):
-            yield self._time(t, a)[:, 0]
+            yield self._time(t, a)
 
     def close(self) -> None:
         """End the processes that read the files."""
         for table in self.tables:
             table.close()
 
-    def _converted(self, start: int, t: Array, q: Array, q_r: Array, tau: Array) -> tuple[Array, Array, Array, Array]:
+    def _converted(self, start: int, parts: Mapping[str, Array]) -> Samples:
         """Samples from `start` on, as the files hold them, in the joint side, SI."""
-        names, first, last = self.columns, self.first, self.tables[-1]
-        q, tau = require_finite(q, names.q, first, start), require_finite(tau, names.tau, last, start)
-        if names.qr:
-            q_r = self.side.position(require_finite(q_r, names.qr, first, start))
-        return self._time(t, start), self.side.position(q), self.side.torque(tau), q_r
+        joint_side = {"q": self.side.position, "q_r": self.side.position, "tau": self.side.torque, "tau_ff": self.side.torque}
+        place = {key: (table, own) for table, groups in groups_of(self.columns, self.tables) for key, own in groups.items()}
+        checked = {key: require_finite(x, place[key][1], place[key][0], start) for key, x in parts.items() if key != "t"}
+        converted = {key: joint_side[key](x) if key in joint_side else self._on_joints(x) for key, x in checked.items()}
+        return Samples(t=self._time(parts["t"], start) if "t" in parts else None, **converted)
+
+    def _on_joints(self, known: Array) -> Array:
+        """Known torques with zeros where a joint has none, shape (N, n)."""
+        own = [name != NONE for name in self.columns.tau_known]
+        if all(own):
+            return known
+        spread = np.zeros((len(known), len(own)))
+        spread[:, own] = known
+        return spread
 
     def _time(self, t: Array, start: int) -> Array:
-        return require_finite(t, [self.columns.t or ""], self.first, start) * time_unit(self.settings.units.t)
+        return np.asarray(require_finite(t, [self.columns.t or ""], self.first, start)[:, 0] * time_unit(self.settings.units.t))
 
 
 def open_record(
@@ -115,23 +159,44 @@ def open_record(
     by_blocks : bool
         Refuse formats that are read whole only.
     """
-    tables = [open_table(path, settings.topic, settings.decimal, by_blocks=by_blocks) for path in record_files(settings, folder)]
-    first, last = tables[0], tables[-1]
+    opened = [open_table(path, settings.topic, settings.decimal, by_blocks=by_blocks) for path in record_files(settings, folder)]
+    first, last, other = tables = places(settings, opened)
     names = column_names(settings, first, last, joints)
-    groups, torques = _groups(names, len(tables))
-    samples, widths = first.samples(groups), first.widths(groups)
-    others = last.samples(torques) if torques else samples
-    for table, count in ((first, samples), (last, others)):
-        if by_blocks and count < SHORTEST:  # a whole record says so itself, after what is wrong with its lines
-            raise InputError(f"{count} samples; a record has at least {SHORTEST}", file=table.file)
-    n, reference = widths[1], widths[2]
-    require_alike(names, first, last, (samples, n), (others, last.widths(torques)[0] if torques else widths[3]))
+    counts: dict[Table, int] = {}
+    widths: dict[str, int] = {}
+    for table, groups in groups_of(names, tables):
+        counts[table] = table.samples(list(groups.values()))
+        widths |= zip(groups, table.widths(list(groups.values())), strict=True)
+        if by_blocks and counts[table] < SHORTEST:  # a whole record says so itself, after what is wrong with its lines
+            raise InputError(f"{counts[table]} samples; a record has at least {SHORTEST}", file=table.file)
+    samples, n = counts[first], widths["q"]
+    require_alike(names, first, last, (samples, n), (counts[last], widths["tau"]))
     if drives is not None and drives.n != n:
         raise InputError(f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file)
-    if reference not in (0, n):
-        raise InputError(f"{reference} reference positions {', '.join(names.qr)}; expected {n}", file=first.file)
-    hashes = dict(zip(label.files, (table.digest for table in tables), strict=True))
-    return RecordFiles(settings, label.name, hashes, tuple(tables), names, samples, n, conversion(settings, drives, first, last, n))
+    if "tau_known" in widths:
+        widths["tau_known"] += names.tau_known.count(NONE)
+    for key, title in (("q_r", "reference positions"), ("tau_ff", "feed-forward torques"), ("tau_known", "known torques")):
+        if widths.get(key, n) != n:
+            raise InputError(f"{widths[key]} {title} {', '.join(asked_columns(names)[key])}; expected {n}", file=first.file)
+    if "tau_known" in widths and counts[other] != samples:
+        raise InputError(f"{samples} samples in {first.file}, {counts[other]} known torques; expected the same instants", file=other.file)
+    hashes = dict(zip(label.files, (table.digest for table in opened), strict=True))
+    return RecordFiles(settings, label.name, hashes, tables, names, samples, n, conversion(settings, drives, first, last, n))
+
+
+def places(settings: RecordSettings, opened: Sequence[Table]) -> tuple[Table, Table, Table]:
+    """The files of the positions, of the torques and of the known torques.
+
+    Of two files the second holds the torques, but for known torques that it has and the first has not, beside torques of the first.
+    """
+    first, last, columns = opened[0], opened[-1], settings.columns
+    if len(opened) == 3 or not columns.tau_known:
+        return first, opened[min(1, len(opened) - 1)], last
+    known = {name for name in columns.tau_known if name != NONE}
+    in_first = known <= {*first.names}
+    torques = {*columns.tau} if columns.tau else {"tau1"}
+    apart = not in_first and torques <= {*first.names}
+    return first, first if apart else last, first if in_first else last
 
 
 def record_files(settings: RecordSettings, folder: Path) -> list[Path]:
@@ -159,7 +224,16 @@ def names_of(model: Any) -> tuple[str, ...]:
     return tuple(labels[j] for j in model.JOINTS) if model is not None and labels.keys() >= {*model.JOINTS} else ()
 
 
-def _groups(names: Columns, files: int) -> tuple[Groups, Groups]:
-    """Columns of the first file: t, q, q_r and, where there is no other, tau; then those of the other."""
-    groups = [[] if names.t is None else [names.t], list(names.q), list(names.qr)]
-    return ([*groups, list(names.tau)], []) if files == 1 else (groups, [list(names.tau)])
+def asked_columns(names: Columns) -> dict[str, tuple[str, ...]]:
+    """Columns by quantity; none of a quantity that is not asked for."""
+    known = tuple(name for name in names.tau_known if name != NONE)
+    return dict(zip(QUANTITIES, (() if names.t is None else (names.t,), names.q, names.qr, names.tau, names.tau_ff, known), strict=True))
+
+
+def groups_of(names: Columns, tables: tuple[Table, Table, Table]) -> list[tuple[Table, dict[str, tuple[str, ...]]]]:
+    """Each file once, with the columns that it is asked for, by quantity."""
+    first, last, other = tables
+    place = dict(zip(QUANTITIES, (first, first, first, last, last, other), strict=True))
+    asked = {key: columns for key, columns in asked_columns(names).items() if columns}
+    groups = {table: {key: columns for key, columns in asked.items() if place[key] is table} for table in dict.fromkeys(tables)}
+    return [(table, own) for table, own in groups.items() if own]

@@ -18,10 +18,9 @@ from runtime.errors import InputError
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.clock import rate_of
-from runtime.records.formats.columns import Array
 from runtime.records.labels import Label, labels
 from runtime.records.named import study_of
-from runtime.records.opening import RecordFiles, drives_of, names_of, open_record
+from runtime.records.opening import RecordFiles, Samples, drives_of, names_of, open_record
 from runtime.records.record import Record
 from runtime.records.resampling import Stretch, resampled
 from runtime.records.time_stamps import time_stamps
@@ -87,23 +86,27 @@ def read_pieces(settings: RecordSettings, label: Label, drives: Drives | None, f
     """The record, or the records into which `resample` splits it at gaps and where time goes back."""
     opened = open_record(settings, label, drives, folder, joints=joints)
     try:
-        t, *signals = opened.read()
-        stretches, rate, text = _uniform(opened, t, signals)
+        samples = opened.read()
+        stretches, rate, text = _uniform(opened, samples)
     finally:
         opened.close()
     K = len(stretches)
+    signals = [dict(zip(samples.signals, stretch.signals, strict=True)) for stretch in stretches]
     return [
         Record(
             stretch.t,
-            *stretch.signals[:2],
+            own["q"],
+            own["tau"],
+            q_r=own.get("q_r"),
+            tau_ff=own.get("tau_ff"),
+            tau_known=own.get("tau_known"),
             rate=rate,
             name=opened.name if K == 1 else f"{opened.name} ({k} of {K})",
             files=opened.hashes,
-            q_r=stretch.signals[2] if opened.columns.qr else None,
             time=text,
             jitter=settings.jitter,
         )
-        for k, stretch in enumerate(stretches, start=1)
+        for k, (stretch, own) in enumerate(zip(stretches, signals, strict=True), start=1)
     ]
 
 
@@ -113,17 +116,17 @@ def require_joints(n: int, files: Sequence[str], model: GeneratedModel | None) -
         raise InputError(f"{n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}", file=", ".join(files))
 
 
-def _uniform(opened: RecordFiles, t: Array, signals: Sequence[Array]) -> tuple[list[Stretch], float, str]:
+def _uniform(opened: RecordFiles, samples: Samples) -> tuple[list[Stretch], float, str]:
     """The samples at a uniform rate, Hz, and what their time stamps are like: as they are, or resampled where the settings ask for it."""
     settings, stamps, file = opened.settings, opened.stamps, opened.first.file
-    if opened.columns.t is None:
+    t, signals = samples.t, tuple(samples.signals.values())
+    if t is None:
         if settings.rate is None:
             raise InputError("no time column and no rate; set record.rate (Hz) or record.columns.t", file=file)
-        return [Stretch(np.arange(opened.samples) / settings.rate, tuple(signals))], settings.rate, ""
-    t = t[:, 0]
+        return [Stretch(np.arange(opened.samples) / settings.rate, signals)], settings.rate, ""
     if settings.resample is None:
         rate = rate_of(stamps, t)
-        return [Stretch(t, tuple(signals))], rate, time_stamps(t, file=file).to_text(stamps.row)
+        return [Stretch(t, signals)], rate, time_stamps(t, file=file).to_text(stamps.row)
     regularity = time_stamps(t, gap=settings.resample.longest, file=file)
     if settings.rate is not None and abs(1 / regularity.period / settings.rate - 1) > IRREGULAR:
         raise InputError(

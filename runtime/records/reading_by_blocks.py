@@ -66,9 +66,10 @@ class FileStream(Stream):
     def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
         """t (B,), q (B, n), tau (B, n), joint side, SI."""
         start = 0
-        for t, q, tau, _ in self.opened.blocks(self.block):
-            yield t[:, 0] if t.shape[1] else self._counted(start, len(q)), q, tau
-            start += len(q)
+        for x in self.opened.blocks(self.block):
+            known = 0.0 if x.tau_known is None else x.tau_known
+            yield self._counted(start, len(x.q)) if x.t is None else x.t, x.q, x.tau - known
+            start += len(x.q)
 
 
 def open_stream(

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -19,6 +19,9 @@ from runtime.records.clock import JITTER, Stamps, rate_of, sample
 from runtime.settings.record import SHORTEST
 
 Array = np.ndarray
+
+UNNAMED = "record"
+"""Name of a record that was given none."""
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -41,6 +44,13 @@ class Record:
         SHA-256 of the uncompressed bytes, by file name.
     q_r : array_like, shape (N, n), rad or m, optional
         What the controller followed.
+    tau_ff : array_like, shape (N, n), N m or N, optional
+        Feed-forward torques that the controller added.
+    tau_known : array_like, shape (N, n), N m or N, optional
+        Torques of the drives that do not come from the model, such as that of a counterbalance. They are subtracted: the attribute `tau` is what is
+        left for the model. None in records that `dataclasses.replace` makes.
+    known : str
+        What was subtracted, a sentence; "" where nothing was.
     time : str
         What the time stamps were like and what was done about them, a sentence; "" where there were none.
     jitter : float
@@ -59,8 +69,11 @@ class Record:
     name: str
     files: Mapping[str, str]
     q_r: Array | None
+    tau_ff: Array | None
     time: str
     jitter: float
+    known: str
+    tau_known: Array | None = field(init=False)
 
     def __init__(
         self,
@@ -69,11 +82,14 @@ class Record:
         tau: ArrayLike,
         *,
         rate: float | None = None,
-        name: str = "record",
+        name: str = UNNAMED,
         files: Mapping[str, str] | None = None,
         q_r: ArrayLike | None = None,
+        tau_ff: ArrayLike | None = None,
+        tau_known: ArrayLike | None = None,
         time: str = "",
         jitter: float = JITTER,
+        known: str = "",
     ) -> None:
         file = ", ".join(files or ()) or name
         given = {"t": np.array(t, dtype=float), "q": np.array(q, dtype=float), "tau": np.array(tau, dtype=float)}
@@ -84,19 +100,31 @@ class Record:
             raise InputError(f"{shapes}; expected (N,), (N, n), (N, n)", file=file)
         if N < SHORTEST:
             raise InputError(f"{N} samples; a record has at least {SHORTEST}", file=file)
-        if q_r is not None:
-            given["q_r"] = np.array(q_r, dtype=float).reshape(N, -1)
-            if given["q_r"].shape != given["q"].shape:
-                raise InputError(f"q_r {given['q_r'].shape}, q {given['q'].shape}; expected the same", file=file)
+        for label, signal in (("q_r", q_r), ("tau_ff", tau_ff), ("tau_known", tau_known)):
+            if signal is not None:
+                x = np.array(signal, dtype=float)
+                given[label] = x[:, None] if x.ndim == 1 else x
+                if given[label].shape != given["q"].shape:
+                    raise InputError(f"{label} {x.shape}, q {given['q'].shape}; expected the same", file=file)
+        if tau_known is not None:
+            require_finite(given["tau_known"], "tauknown", file)
+            given["tau"] = given["tau"] - given["tau_known"]
+            known = known or known_text(given["tau_known"])
         for label, x in given.items():
             require_finite(x, label.replace("_", ""), file)
             x.setflags(write=False)
         if rate is not None and not (np.isfinite(rate) and rate > 0):
             raise InputError(f"rate {rate} Hz; expected a positive number", file=file)
         rate = rate_of(Stamps(file, rate=rate, jitter=jitter), given["t"])
-        others = {"rate": rate, "name": name, "files": MappingProxyType(dict(files or {})), "q_r": None, "time": time, "jitter": jitter}
+        others = {"rate": rate, "name": name, "files": MappingProxyType(dict(files or {})), "time": time, "jitter": jitter, "known": known}
+        others |= dict.fromkeys(("q_r", "tau_ff", "tau_known"))
         for label, value in (others | given).items():
             object.__setattr__(self, label, value)
+
+    @property
+    def file(self) -> str:
+        """What messages call it: its files, or its name where it was made of arrays."""
+        return ", ".join(self.files) or self.name
 
     @property
     def n(self) -> int:
@@ -108,8 +136,14 @@ class Record:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Records travel to other processes; a read-only mapping alone could not."""
-        others = {name: getattr(self, name) for name in ("rate", "name", "q_r", "time", "jitter")}
-        return partial(Record, files=dict(self.files), **others), (self.t, self.q, self.tau)
+        others = {name: getattr(self, name) for name in ("rate", "name", "q_r", "tau_ff", "time", "jitter", "known")}
+        return partial(Record, files=dict(self.files), **others), (self.t, self.q, self.tau), {"tau_known": self.tau_known}
+
+
+def known_text(known: Array) -> str:
+    """What known torques, shape (N, n), take from the record, a sentence."""
+    largest = np.abs(known).max(axis=0)
+    return "known torques subtracted: " + ", ".join(f"up to {x:.4g} of joint {j}" for j, x in enumerate(largest, 1) if x) + " (N m or N)"
 
 
 def require_finite(x: Array, label: str, file: str) -> None:

@@ -21,6 +21,11 @@ def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
     return names
 
 
+def _distinct_but_none(names: tuple[str, ...]) -> tuple[str, ...]:
+    _distinct(tuple(name for name in names if name != NONE))
+    return names
+
+
 def _known(read: Callable[[str], Any]) -> AfterValidator:
     def check(unit: str) -> str:
         read(unit)
@@ -29,7 +34,9 @@ def _known(read: Callable[[str], Any]) -> AfterValidator:
     return AfterValidator(check)
 
 
+NONE = "0"  # in place of a column: no such torque on this joint
 Names = Annotated[Many[Text], AfterValidator(_distinct)]
+SomeNames = Annotated[Many[Text], AfterValidator(_distinct_but_none)]
 TimeUnit = Annotated[Text, _known(time_unit)]
 PositionUnit = Annotated[Text, _known(position_unit)]
 TorqueUnit = Annotated[Text, _known(torque_unit)]
@@ -56,12 +63,19 @@ class Columns(Settings):
         Torques.
     qr : tuple of str
         Reference positions, where the file of the positions holds them; unit and side are those of q.
+    tau_ff : tuple of str
+        Feed-forward torques that the controller added, in the file of the torques; unit and side are those of tau. For methods that simulate it.
+    tau_known : tuple of str
+        Torques of the drives that do not come from the model (a counterbalance, a cable), computed elsewhere; N m or N, joint side. They are
+        subtracted from tau. 0 in place of a name: none on this joint.
     """
 
     t: Text | None = None
     q: Names = ()
     tau: Names = ()
     qr: Names = ()
+    tau_ff: Names = ()
+    tau_known: SomeNames = ()
 
 
 class Units(Settings):
@@ -130,7 +144,8 @@ class RecordSettings(Settings):
     Attributes
     ----------
     files : tuple of str
-        One file with all columns, or two: positions (and time), then torques. Relative to the study file, or files of `dataset`.
+        One file with all columns, or two: positions (and time), then torques; then, where it is apart, the file of the known torques. Relative to
+        the study file, or files of `dataset`.
     columns : Columns
         Names of the columns.
     side : str
@@ -184,7 +199,9 @@ class RecordSettings(Settings):
     also: Many[Many[Text]] = ()
 
     def __post_init__(self) -> None:
-        require(len(self.files) <= 2, f"{len(self.files)} files; expected one, or two (positions, then torques)", "files")
+        most = 3 if self.columns.tau_known else 2
+        message = f"{len(self.files)} files; expected one, or two (positions, then torques)"
+        require(len(self.files) <= most, message + (", and one of known torques" if most > 2 else ""), "files")
         for i, files in enumerate(self.also):
             message = f"{len(files)} files; expected {len(self.files)}, as in files: {list(self.files)}"
             require(len(files) == len(self.files), message, "also", i)

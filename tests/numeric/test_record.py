@@ -487,9 +487,16 @@ def test_different_lengths(tmp_path):
 
 
 def test_samples_run_along_the_longer_side(tmp_path):
-    np.savez(tmp_path / "a.npz", q=Q.T, tau=TAU.T)
-    with pytest.raises(InputError, match="samples along the first axis"):
-        read_record(settings(files="a.npz", rate=RATE, columns={"q": "q", "tau": "tau"}), folder=tmp_path)
+    np.savez(tmp_path / "a.npz", q=Q.T, tau=np.asfortranarray(TAU.T), deep=np.zeros((2, 3, 4)))
+    record = read_record(settings(files="a.npz", rate=RATE, columns={"q": "q", "tau": "tau"}), folder=tmp_path)
+    np.testing.assert_array_equal(record.q, Q)
+    np.testing.assert_array_equal(record.tau, TAU)
+    np.save(tmp_path / "a.npy", np.vstack([Q.T, TAU.T]))
+    np.testing.assert_array_equal(
+        read_record(settings(files="a.npy", rate=RATE, columns={"q": [1, 2], "tau": [3, 4]}), folder=tmp_path).tau, TAU
+    )
+    with pytest.raises(InputError, match="k columns of N samples"):
+        read_record(settings(files="a.npz", rate=RATE, columns={"q": "deep", "tau": "tau"}), folder=tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,7 @@
-"""Columns of a file of named arrays (.npz, .mat): vectors of N samples, and matrices (N, k) that stand for k columns."""
+"""Columns of a file of named arrays (.npz, .mat): vectors of N samples, and matrices (N, k) or (k, N) that stand for k columns.
+
+Samples run along the longer side: a record has more samples than joints.
+"""
 
 from __future__ import annotations
 
@@ -38,13 +41,19 @@ class Held:
     def blocks(self, size: int) -> Iterator[Array]:
         """Consecutive samples, shape (B, k)."""
         N = samples_of(self.shape)
-        columns = self.array.reshape(N, prod(self.shape) // N)
+        array = self.array.T if transposed(self.shape) else self.array
+        columns = array.reshape(N, prod(self.shape) // N)
         return (columns[a : a + size] for a in range(0, N, size))
 
 
 def samples_of(shape: tuple[int, ...]) -> int:
-    """Length along the axis of the samples; (N,), (1, N) and (N, 1) are vectors, () is one sample."""
-    return max(shape, default=1) if shape[:1] in ((), (1,)) else shape[0]
+    """Length along the axis of the samples, the longer one of two; () is one sample."""
+    return shape[1] if transposed(shape) else shape[0] if shape else 1
+
+
+def transposed(shape: tuple[int, ...]) -> bool:
+    """Whether the samples of a matrix run along its second axis, (k, N) with k < N."""
+    return len(shape) == 2 and shape[0] < shape[1]
 
 
 @dataclass(eq=False, kw_only=True)
@@ -94,8 +103,8 @@ class ArrayTable(Table):
     def _series(self, name: str) -> Series:
         """The array of that name, if it is one of samples."""
         x = self._array(name)
-        if len(x.shape) > 2 or (len(x.shape) == 2 and 1 < x.shape[0] < x.shape[1]):
-            raise InputError(f"shape {x.shape}; expected (N,) or (N, k), samples along the first axis", file=self.file, column=name)
+        if len(x.shape) > 2:
+            raise InputError(f"shape {x.shape}; expected (N,), (N, k) or (k, N), k columns of N samples", file=self.file, column=name)
         if not prod(x.shape):
             raise InputError("no samples", file=self.file, column=name)
         if prod(x.shape) // samples_of(x.shape) > WIDEST:

@@ -23,7 +23,7 @@ from numpy.lib import format as npy
 
 from runtime.errors import InputError, first_line
 from runtime.files import require_size
-from runtime.records.formats.arrays import ArrayTable, is_numeric, samples_of
+from runtime.records.formats.arrays import ArrayTable, is_numeric, samples_of, transposed
 from runtime.records.formats.columns import WIDEST, Array, Groups, Source, Table
 
 DAMAGED = (
@@ -112,7 +112,7 @@ class ArchiveTable(ArrayTable):
 
 @dataclass(eq=False, kw_only=True)
 class MatrixTable(Table):
-    """The array of a .npy file, shape (N,) or (N, k): columns are called 1, 2 ..."""
+    """The array of a .npy file, shape (N,), (N, k) or (k, N): columns are called 1, 2 ..."""
 
     matrix: Stored
 
@@ -145,9 +145,14 @@ def open_npy(source: Source) -> MatrixTable:
     with refused(SINGLE, source.file):
         matrix = _stored(source.open)
     shape = matrix.shape
-    if not is_numeric(matrix.dtype) or len(shape) not in (1, 2) or not all(k > 0 for k in shape) or prod(shape[1:]) > WIDEST:
+    if (
+        not is_numeric(matrix.dtype)
+        or len(shape) not in (1, 2)
+        or not all(k > 0 for k in shape)
+        or prod(shape) // samples_of(shape) > WIDEST
+    ):
         raise InputError(
-            f"{matrix.dtype} of shape {shape}; expected numbers of shape (N,) or (N, k), at most {WIDEST} columns", file=source.file
+            f"{matrix.dtype} of shape {shape}; expected numbers of shape (N,), (N, k) or (k, N), at most {WIDEST} columns", file=source.file
         )
     names = tuple(str(i + 1) for i in range(prod(shape) // samples_of(shape)))
     return MatrixTable(file=source.file, size=source.size, names=names, matrix=matrix)
@@ -187,4 +192,5 @@ def _header(handle: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
 def _stored(open_bytes: Callable[[], IO[bytes]]) -> Stored:
     with open_bytes() as handle:
         shape, fortran, dtype = _header(handle)
-    return Stored(open_bytes, shape, fortran and len(shape) > 1, dtype)
+    turned = transposed(shape)  # (k, N) by rows is (N, k) by columns
+    return Stored(open_bytes, shape[::-1] if turned else shape, fortran != turned and len(shape) > 1, dtype)
