@@ -31,6 +31,7 @@ from runtime.motion.reference import Reference, reference_of
 from runtime.observation.filters import States, decimated, filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states
 from runtime.observation.rows import Selection, select_rows
+from runtime.observation.states import observed_states
 from runtime.observation.system import LoopRows, Observation, stack
 from runtime.records.record import Record
 from runtime.settings.controller import Controller
@@ -105,7 +106,9 @@ class ClosedLoop:
 
     def measured(self) -> Observation:
         """Y = W X + rho of the measured positions on the rows of the loop, which it carries along."""
-        observation = self._observed([filtered_states(p.record.q, p.record.rate, p.selection.signals) for p in self.parts])
+        observation = self._observed(
+            [observed_states(self.model, p.record.q, p.record.rate, p.selection.signals, name=p.record.name) for p in self.parts]
+        )
         return replace(observation, closed_loop=LoopRows(self, np.arange(len(observation.Y))))
 
     def instruments(self, runs: Sequence[SimulatedRun], observation: Observation) -> Observation:
@@ -201,7 +204,7 @@ def _reference(model: GeneratedModel, records: Sequence[Record], k: int, control
     """What the controller followed in record k, at its rate."""
     record = records[k]
     if reference == "measured":
-        states = filtered_states(record.q, record.rate, study.signals)
+        states = observed_states(model, record.q, record.rate, study.signals, name=record.name)
         if controller.record_every == 1:
             return Reference(controller.rate, states.q, states.qd, states.qdd)
         ticks = np.arange((len(record) - 1) * controller.record_every + 1) / controller.record_every

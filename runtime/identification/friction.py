@@ -41,9 +41,10 @@ from runtime.identification.friction_laws import (
 from runtime.identification.residuals import correlation_time, residual_correlation
 from runtime.model.generated import GeneratedModel, elements_of, require
 from runtime.model.inertia import physical_model
-from runtime.observation.filters import decimated, filtered_states
+from runtime.observation.filters import decimated
 from runtime.observation.observation import decimated_torque, observation_from_states
 from runtime.observation.rows import select_rows
+from runtime.observation.states import observed_states
 from runtime.records.record import Record
 from runtime.settings.study import Study
 from runtime.table import aligned
@@ -176,7 +177,7 @@ def own_friction(model: GeneratedModel, j: int) -> list[int]:
 
 def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, number: int) -> list[Terms]:
     """Terms of every joint of one record."""
-    states = filtered_states(record.q, record.rate, study.signals)
+    states = observed_states(model, record.q, record.rate, study.signals, name=record.name)
     selection = select_rows(record, states.qd, study.signals, study.rows)
     observation = observation_from_states(model, states, decimated_torque(record.tau, selection), selection)
     window = states[selection.samples]

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from runtime.errors import InputError
+from runtime.errors import InputError, SettingsError
 from runtime.model.generated import GeneratedModel
 from runtime.observation.filters import States, decimation_factor, decimation_plan, kept_samples
 from runtime.observation.regressor_signals import DistinctSignals, Entries
@@ -146,6 +146,8 @@ def observed_blocks(
 
 def filtered_blocks(stream: Stream, signals: Signals) -> Iterator[tuple[Array, Array, Array, Array, Array]]:
     """t (B,), q, qd, qdd and torques (B, n) after the median and low-pass filters, by blocks of their own lengths."""
+    if signals.reader != "lowpass":
+        raise SettingsError("counts; a record read by blocks is not read as counts yet, set stream: off", path=("signals", "reader"))
     position, velocity = position_stage(stream.rate, signals), velocity_stage(stream.rate, signals)
     acceleration, torque = derivative_stage(stream.rate, signals.ends), Chain(*median_stage(signals.median))
     queues = [Queue() for _ in range(5)]

@@ -24,15 +24,37 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
+class SpeedErrors:
+    """What is known of errors of the velocities: those of the encoders are independent.
+
+    deviation : ndarray, shape (N, encoders), per s.   root : ndarray, shape (n, encoders), joint velocity per encoder velocity.
+    """
+
+    deviation: Array
+    root: Array
+
+    def __getitem__(self, samples: slice) -> SpeedErrors:
+        return SpeedErrors(self.deviation[samples], self.root)
+
+    def along(self, G: Array) -> Array:
+        """Deviation of s = G qd, shape (N,); G, shape (n,)."""
+        return np.asarray(np.sqrt(self.deviation**2 @ (G @ self.root) ** 2))
+
+
+@dataclass(frozen=True, eq=False)
 class States:
-    """Joint positions, velocities and accelerations, each of shape (N, n), rad or m, per s, per s^2."""
+    """Joint positions, velocities and accelerations, each of shape (N, n), rad or m, per s, per s^2.
+
+    errors : what is known of errors of the velocities; None: they count as exact.
+    """
 
     q: Array
     qd: Array
     qdd: Array
+    errors: SpeedErrors | None = None
 
     def __getitem__(self, samples: slice) -> States:
-        return States(self.q[samples], self.qd[samples], self.qdd[samples])
+        return States(self.q[samples], self.qd[samples], self.qdd[samples], None if self.errors is None else self.errors[samples])
 
     def __len__(self) -> int:
         return len(self.q)
@@ -146,6 +168,7 @@ __all__ = [
     "Decimate",
     "Lowpass",
     "Signals",
+    "SpeedErrors",
     "States",
     "butterworth",
     "decimated",

@@ -1,13 +1,13 @@
 """From records to the observed linear system Y = W X + rho, eqs. (6) and (14).
 
     observe(model, records, study)                   the whole way, one record or several stacked, in memory or by blocks; or its steps:
-    filtered_states(q, rate, signals)                q, qd, qdd
+    observed_states(model, q, rate, signals)         q, qd, qdd, by the reader of the study
     select_rows(record, qd, study)                   window, decimated instants, rows left out
     decimated_torque(tau, selection)                 Y, shape (n, K)
     observation_from_states(model, states, torque, selection)
 
 A study that perturbs the positions (CESTAC) calls `select_rows` and `decimated_torque` once, on the measured record, and repeats
-`filtered_states` and `observation_from_states` with perturbed positions: Y and the choice of rows stay those of the record, so that a row is
+`observed_states` and `observation_from_states` with perturbed positions: Y and the choice of rows stay those of the record, so that a row is
 never kept or dropped because of noise.
 
 Records that are read by blocks give the same Observation while W stays below HELD bytes. Beyond, its rows are reduced to triangular factors of
@@ -29,6 +29,7 @@ from runtime.observation.filters import States, decimated, filtered_states, medi
 from runtime.observation.regressor_signals import decimated_columns, distinct_entries
 from runtime.observation.rows import Selection, select_rows
 from runtime.observation.segments import HeldRows, Segment, SegmentFactors, Window
+from runtime.observation.states import observed_states
 from runtime.observation.system import (
     HELD,
     Observation,
@@ -54,6 +55,7 @@ __all__ = [
     "filtered_states",
     "observation_from_states",
     "observe",
+    "observed_states",
     "select_rows",
     "stack",
 ]
@@ -115,7 +117,7 @@ def observe(
     parts = []
     for record in several:
         assert isinstance(record, Record)
-        states = filtered_states(record.q, record.rate, study.signals)
+        states = observed_states(model, record.q, record.rate, study.signals, name=record.name)
         selection = select_rows(record, states.qd, study.signals, study.rows, keep=keep)
         torque = decimated_torque(record.tau, selection)
         parts.append(observation_from_states(model, states, torque, selection, files=record.files, columns=columns, constants=constants))

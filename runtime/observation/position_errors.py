@@ -204,8 +204,10 @@ def with_errors(
     """`observation` of the record with the covariance of the errors of its columns, for errors of every encoder of that deviation.
 
     deviation : of one raw position, rad or m, on the side study.cestac.side. Columns that switch with the sign of a speed count as exact.
-    Raises SettingsError where a median filter stands ahead of the others.
+    Raises SettingsError where a median filter stands ahead of the others, or positions are read as counts.
     """
+    if study.signals.reader != "lowpass":
+        raise SettingsError("counts; the errors of the columns are known for reader: lowpass alone", path=("signals", "reader"))
     if study.signals.median != 1:
         raise SettingsError(
             f"{study.signals.median}; the errors of the columns are known for linear filters alone, use 1", path=("signals", "median")

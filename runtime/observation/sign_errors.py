@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import factorial
+from typing import Literal
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft
@@ -86,10 +87,15 @@ class Switched:
         return Switched(sigma, shift, slope / sigma, variance * sigma)
 
 
-def switches(model: GeneratedModel, names: Sequence[str], constants: Mapping[str, float] | None = None) -> tuple[Switch, ...]:
-    """Columns among `names` that switch, from the elements of the model; ModelError where it has none or one acts along a passive joint.
+def switches(
+    model: GeneratedModel,
+    names: Sequence[str],
+    constants: Mapping[str, float] | None = None,
+    passive: Literal["refused", "left out"] = "refused",
+) -> tuple[Switch, ...]:
+    """Columns among `names` that switch, from the elements of the model; ModelError where it has none.
 
-    constants : values in place of the robot file's.
+    constants : values in place of the robot file's.   passive : what is done about one that acts along a passive joint.
     """
     elements = elements_of(model, constants)
     switching = []
@@ -102,11 +108,25 @@ def switches(model: GeneratedModel, names: Sequence[str], constants: Mapping[str
         if shape is None:
             continue
         strange = [j for j in along if j not in model.JOINTS]
+        if strange and passive == "left out":
+            continue
         if strange:
             raise ModelError(f"{name} acts along {strange}, which are no actuated joints; no prediction is made for it", file=model.NAME)
         G = np.array([along.get(j, 0.0) for j in model.JOINTS])
         switching.append(Switch(column, G, *shape))
     return tuple(switching)
+
+
+def expected_shift(switch: Switch, s: Array, sigma: Array) -> Array:
+    """E f - f of a switch, shape (N,), at s = G qd known up to normal errors of deviation sigma, shape (N,)."""
+    shift = np.zeros(len(s))
+    near = np.flatnonzero((np.abs(s) < FAR * sigma) | ((sigma > 0) & (switch.kink != 0)))
+    u = s[near] / sigma[near]
+    m = erf(u / np.sqrt(2))
+    shift[near] = switch.jump * (m - np.sign(u))
+    if switch.kink:
+        shift[near] += switch.kink * sigma[near] * (u * (m - np.sign(u)) + np.sqrt(2 / np.pi) * np.exp(-(u**2) / 2))
+    return shift
 
 
 def _shape(kind: str, direction: str) -> tuple[float, float, float] | None:

@@ -107,12 +107,26 @@ class Signals(Settings):
         Derivative at the two ends: a one-sided difference, or one of second order.
     decimate : Decimate or None
         Decimation; null switches it off.
+    reader : str
+        Ahead of the low-pass: lowpass takes positions as they are; counts takes them as counts of an encoder, which bound the motion, and
+        needs no median.
+    step : float or tuple of float or None, rad or m
+        Step of the encoders, for counts; null: from the record.
+    side : str
+        Side of the encoders, for counts: joint, or motor by the drives of the robot.
     """
 
     median: OddWindow = 5
     lowpass: Lowpass | None = field(default_factory=Lowpass)
     ends: Literal["one-sided", "second-order"] = "one-sided"
     decimate: Decimate | None = field(default_factory=Decimate)
+    reader: Literal["lowpass", "counts"] = "lowpass"
+    step: PerJoint[Positive] | None = None
+    side: Literal["joint", "motor"] = "joint"
+
+    def __post_init__(self) -> None:
+        for key, given in (("step", self.step is not None), ("side", self.side != "joint")):
+            require(self.reader == "counts" or not given, "given, but reader is lowpass; it is a setting of reader: counts", key)
 
 
 class Rows(Settings):

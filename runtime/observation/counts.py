@@ -1,0 +1,157 @@
+"""From the counts of encoders to positions, velocities and accelerations with their deviations (docs/theory/counts.md).
+
+    reading = read_counts(position, rate, step)        encoder side, shape (N, n)
+    reading.q, reading.s_q, reading.sign, reading.findings
+
+Records longer than STRETCH samples are read in stretches that overlap by MARGIN samples on either side: memory and time are linear in their length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.special import erf
+
+from runtime.observation.count_smoother import LINES, Smoothed, smoothed
+from runtime.observation.encoder_lattice import Lattice, lattice, unwrapped
+
+Array = np.ndarray
+
+STRETCH, MARGIN = 65536, 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What counts say of a motion; arrays of shape (N, n) at the encoder side, rad or m, per s, per s^2.
+
+    Attributes
+    ----------
+    q, qd, qdd : ndarray, shape (N, n)
+        Means of the posterior.
+    s_q, s_qd, s_qdd : ndarray, shape (N, n)
+        Its deviations.
+    jerk_density : ndarray, shape (n,), rad/s^3/sqrt(Hz) or m/s^3/sqrt(Hz)
+        Root of the mean density r of the white jerk.
+    step, phase : ndarray, shape (n,), rad or m
+        Lattice of the encoders.
+    findings : tuple of str
+        What the record shows of its encoders, a sentence each.
+    """
+
+    q: Array
+    qd: Array
+    qdd: Array
+    s_q: Array
+    s_qd: Array
+    s_qdd: Array
+    jerk_density: Array
+    step: Array
+    phase: Array
+    findings: tuple[str, ...]
+    parts: tuple[Part, ...]
+
+    @property
+    def sign(self) -> Array:
+        """E[sign qd] = erf(qd/(sqrt(2) s_qd)), shape (N, n); 0 at rest."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(self.s_qd > 0, erf(self.qd / (np.sqrt(2) * self.s_qd)), np.sign(self.qd)))
+
+    def draw(self, rng: np.random.Generator) -> Array:
+        """Positions drawn from the posterior, shape (N, n)."""
+        x = np.array(self.q)
+        for part in self.parts:
+            drawn = (part.smoothed.draw(rng) * self.step[part.moving, None]).T + self.phase[part.moving]
+            head = max(part.first - part.begin, 0)  # samples shared with the stretch before: from one draw to the next
+            w = np.ones(len(drawn))
+            if head:
+                w[:head], w[head : 2 * head] = 0.0, np.linspace(0, 1, len(w[head : 2 * head]))
+            at = np.ix_(np.arange(part.begin, part.begin + len(drawn)), part.moving)
+            x[at] += w[:, None] * (drawn - x[at])
+        return x
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A stretch: its samples start at `begin`, those that count are [first, stop).   moving : encoders whose counts change in it."""
+
+    smoothed: Smoothed
+    begin: int
+    first: int
+    stop: int
+    moving: Array
+
+
+def read_counts(
+    position: Array,
+    rate: float,
+    step: Array | Sequence[float] | float | None = None,
+    phase: Array | None = None,
+    *,
+    lines: float = LINES,
+    name: str = "record",
+) -> Reading:
+    """Positions, velocities and accelerations from counts, with deviations.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N, n), rad or m
+        At the encoder side: counts times step plus phase. nan: a sample that is missing.
+    rate : float, Hz
+        Sampling rate.
+    step : float or ndarray, shape (n,), rad or m, optional
+        Step of the encoders; default: from the record.
+    phase : ndarray, shape (n,), rad or m, optional
+        A position of the lattice of each encoder, the middle of an interval; default: from the record.
+    lines : float
+        Deviation of the lines from equal distances, steps.
+    name : str
+        What errors call the record.
+
+    Returns
+    -------
+    Reading
+
+    Raises
+    ------
+    InputError
+        No count changes; a step that is not positive or larger than the motion; positions off the lattice; counts that jump.
+    """
+    known = lattice(position, step, phase, name=name)
+    counts, said = unwrapped(known.counts(position), name=name)
+    return _reading(counts, rate, known, lines, said)
+
+
+def _reading(counts: Array, rate: float, known: Lattice, lines: float, said: Sequence[str]) -> Reading:
+    N, n = counts.shape
+    states = [np.empty((N, n)) for _ in range(6)]
+    density, parts = np.zeros(n), []
+    for begin, first, stop, end in stretches(N):
+        k = np.ascontiguousarray(counts[begin:end].T)
+        moving = np.flatnonzero(np.nanmax(k, axis=1) > np.nanmin(k, axis=1))
+        resting = np.setdiff1d(np.arange(n), moving)
+        for value, i in zip((np.nanmean(k[resting], axis=1), 0.0, 0.0, 12**-0.5, 0.0, 0.0), range(6), strict=True):
+            states[i][first:stop, resting] = value
+        if len(moving):
+            part = Part(smoothed(k[moving], 1 / rate, lines=lines), begin, first, stop, moving)
+            for order in range(3):
+                for i, x in zip((order, order + 3), part.smoothed.state(order), strict=True):
+                    states[i][first:stop, moving] = x[:, first - begin : stop - begin].T
+            density[moving] += part.smoothed.density.mean(axis=1) * (stop - first) / N
+            parts.append(part)
+    for i, x in enumerate(states):
+        x *= known.step
+        if i == 0:
+            x += known.phase
+    q, qd, qdd, s_q, s_qd, s_qdd = states
+    jerk = np.sqrt(density) * known.step
+    return Reading(q, qd, qdd, s_q, s_qd, s_qdd, jerk, known.step, known.phase, (*known.findings, *said), tuple(parts))
+
+
+def stretches(N: int) -> list[tuple[int, int, int, int]]:
+    """(begin, first, stop, end): samples [begin, end) are read to know [first, stop)."""
+    count = max(1, round(N / STRETCH))
+    cuts = [*(STRETCH * i for i in range(count)), N]
+    return [(max(a - MARGIN, 0), a, b, min(b + MARGIN, N)) for a, b in pairwise(cuts)]

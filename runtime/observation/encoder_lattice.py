@@ -1,0 +1,163 @@
+"""Positions of an encoder as counts: position = count step + phase, with what contradicts that said or refused.
+
+The step comes from a data sheet or from the record, the phase from the record alone. Floor against round in a driver, and an offset of up to half a
+step of the zero of the joint, cannot be told from counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.errors import InputError
+
+Array = np.ndarray
+
+OFF = 0.1
+"""rms distance from the lattice, steps, from which positions are none of its points; positions anywhere have 0.29."""
+WRAPS = (2**16, 2**32)
+FAST = 20
+"""Median change of the count from sample to sample, where it changes, above which a record tells of positions alone."""
+JUMP = 30
+"""A change of the count this many times its neighbours is none of a motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Steps and phases of n encoders, shape (n,), rad or m, and sentences about them."""
+
+    step: Array
+    phase: Array
+    findings: tuple[str, ...] = ()
+
+    def counts(self, position: Array) -> Array:
+        """Counts, shape (N, n), as floats; nan where the position is missing."""
+        return np.asarray(np.round((position - self.phase) / self.step))
+
+    def position(self, counts: Array) -> Array:
+        """Positions of counts, shape (N, n)."""
+        return np.asarray(counts * self.step + self.phase)
+
+
+def lattice(
+    position: Array, step: Array | Sequence[float] | float | None = None, phase: Array | None = None, *, name: str = "record"
+) -> Lattice:
+    """The lattice of positions, shape (N, n), at the encoder side.
+
+    step : rad or m, one or one for each encoder; default: from the record.   phase : shape (n,); default: from the record.
+
+    Raises InputError where a step is not positive, is larger than the motion, or positions do not lie on its lattice.
+    """
+    n = position.shape[1]
+    if step is not None:
+        given = np.atleast_1d(np.asarray(step, dtype=float))
+        if given.shape not in {(1,), (n,)} or not (np.isfinite(given).all() and (given > 0).all()):
+            raise InputError(f"step {step}; expected a positive number of rad or m, or {n}, one for each encoder", file=name)
+        step = np.broadcast_to(given, (n,))
+    if phase is not None and np.shape(phase) != (n,):
+        raise InputError(f"phase {np.shape(phase)}; expected ({n},), one for each encoder", file=name)
+    if not any(np.nanmax(x) > np.nanmin(x) for x in position.T if np.isfinite(x).any()):
+        raise InputError("no position changes: counts that never change say nothing of a motion; record one", file=name)
+    steps, phases, findings = np.empty(n), np.empty(n), []
+    for j in range(n):
+        x, label = position[np.isfinite(position[:, j]), j], f"encoder {j + 1}"
+        if not len(x):
+            raise InputError(f"{label}: no sample is known", file=name)
+        steps[j], said = _step(x, None if step is None else float(step[j]), label, name)
+        phases[j] = _phase(x, steps[j]) if phase is None else phase[j]
+        findings += [*said, *_speed(np.diff(np.round((x - phases[j]) / steps[j])), label)]
+        off = _distance(x, steps[j], phases[j])
+        if off > OFF:
+            raise InputError(
+                f"{label}: positions lie {off:.2g} steps (rms) off the lattice of step {steps[j]:.6g}; they were filtered, interpolated or "
+                "converted by a driver, or the step is another: correct signals.step, record the counts, or use reader: lowpass",
+                file=name,
+            )
+        if off > OFF / 5:
+            findings.append(
+                f"{label}: positions lie {off:.2g} steps (rms) off the lattice of step {steps[j]:.6g}, as if rounded to few digits"
+            )
+    return Lattice(steps, phases, tuple(findings))
+
+
+def smallest_step(x: Array) -> float:
+    """The step of the lattice that distinct positions x, shape (N,), suggest; 0 where they never change."""
+    values = np.unique(x)
+    gaps = np.diff(values)
+    gaps = gaps[gaps > 1e-9 * max(np.ptp(values), np.abs(values).max() * 1e-5)]
+    if not len(gaps):
+        return 0.0
+    least = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
+    for _ in range(3):  # gaps are few steps each: their sum over their number of steps
+        near = gaps[gaps < 20.5 * least]
+        least = float(near.sum() / np.round(near / least).sum())
+    return least
+
+
+def unwrapped(counts: Array, *, name: str = "record") -> tuple[Array, tuple[str, ...]]:
+    """Counts, shape (N, n), without wraps at 2^16 or 2^32; InputError where they jump otherwise."""
+    findings = []
+    for j in range(counts.shape[1]):
+        known = np.flatnonzero(np.isfinite(counts[:, j]))
+        k = counts[known, j]
+        change = np.diff(k)
+        near = np.maximum(np.abs(np.roll(change, 1)), np.abs(np.roll(change, -1)))
+        near = np.maximum(near, np.maximum(np.abs(np.roll(change, 2)), np.abs(np.roll(change, -2))))
+        jumps = np.flatnonzero(np.abs(change) > JUMP * (near + 2) * np.diff(known))
+        if not len(jumps):
+            continue
+        wrap = next((w for w in WRAPS if (np.abs(np.abs(change[jumps]) - w) <= 2 * (near[jumps] + 2)).all()), None)
+        if wrap is None:
+            raise InputError(
+                f"encoder {j + 1}: the count jumps by {change[jumps[0]]:.0f} at sample {known[jumps[0] + 1]}, {len(jumps)} times in all; "
+                "it was reset or lost there, cut the record at these samples",
+                file=name,
+            )
+        turns = np.zeros(len(k))
+        turns[jumps + 1] = -np.sign(change[jumps]) * wrap
+        counts = counts.copy()
+        counts[known, j] = k + np.cumsum(turns)
+        findings.append(f"encoder {j + 1}: the count wraps at 2^{int(np.log2(wrap))} {len(jumps)} times; it was unwrapped")
+    return counts, tuple(findings)
+
+
+def _step(x: Array, given: float | None, label: str, name: str) -> tuple[float, list[str]]:
+    span = float(np.ptp(x))
+    if given is None:
+        own = smallest_step(x)
+        if own == 0:
+            return 1.0, [f"{label}: the count never changes; the position is taken as at rest"]
+        return own, [f"{label}: step {own:.6g} from the record"]
+    if span == 0:
+        return given, [f"{label}: the count never changes; the position is known to {given / np.sqrt(12):.3g} and taken as at rest"]
+    if given > 1.5 * span:
+        raise InputError(
+            f"{label}: step {given:g} is larger than its motion, {span:g}; correct signals.step (side: {label} sees the motor or the joint)",
+            file=name,
+        )
+    changes = np.abs(np.round(np.diff(x) / given))
+    changes = changes[changes > 0].astype(np.int64)
+    common = int(np.gcd.reduce(changes)) if len(changes) >= 20 else 1
+    if common > 1:
+        return common * given, [
+            f"{label}: counts change by multiples of {common}; the step of the record is {common * given:.6g}, not {given:.6g}"
+        ]
+    return given, []
+
+
+def _phase(x: Array, step: float) -> float:
+    return float(step * np.angle(np.exp(2j * np.pi * (x / step)).mean()) / (2 * np.pi))
+
+
+def _distance(x: Array, step: float, phase: float) -> float:
+    cell = (x - phase) / step
+    return float(np.sqrt(np.mean((cell - np.round(cell)) ** 2)))
+
+
+def _speed(change: Array, label: str) -> list[str]:
+    moving = np.abs(change[change != 0])
+    if len(moving) and (fast := float(np.median(moving))) > FAST:
+        return [f"{label}: the count changes by {fast:.0f} a sample; no edge is seen, counts tell as much as positions here"]
+    return []

@@ -1,0 +1,78 @@
+"""Joint states of measured positions, by the reader that the study names.
+
+lowpass    positions as they are, filtered and differentiated (`runtime.observation.filters`)
+counts     positions as counts of encoders (`runtime.observation.counts`), whose posterior mean is then filtered alike; errors of the
+           velocities are known, and make the columns of dry friction expectations
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from runtime.errors import SettingsError
+from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel, drives_of
+from runtime.observation.counts import Reading, read_counts
+from runtime.observation.filters import SpeedErrors, States, filtered_states
+from runtime.settings.study import Signals
+
+Array = np.ndarray
+
+
+def observed_states(
+    model: GeneratedModel, q: Array, rate: float, signals: Signals, *, drives: Drives | None = None, name: str = "record"
+) -> States:
+    """q, qd, qdd of measured joint positions by the reader of the study.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        Emitted module, for its drives.
+    q : ndarray, shape (N, n), rad or m
+        Joint side.
+    rate : float, Hz
+        Sampling rate.
+    signals : Signals
+        Reader and filters.
+    drives : Drives, optional
+        Motor side; default: that of the model.
+    name : str
+        What errors call the record.
+    """
+    if signals.reader == "lowpass":
+        return filtered_states(q, rate, signals)
+    drives = encoder_drives(model, signals, drives)
+    return joint_states(read_counts(encoder_position(q, drives), rate, signals.step, name=name), rate, signals, drives)
+
+
+def joint_states(reading: Reading, rate: float, signals: Signals, drives: Drives | None) -> States:
+    """States of a reading, joint side, through the filters of the study; drives : None for encoders on the joint side."""
+    q = reading.q if drives is None else drives.joint_position(reading.q)
+    states = filtered_states(q, rate, replace(signals, median=1))
+    return replace(states, errors=SpeedErrors(reading.s_qd, encoder_root(drives, q.shape[1])))
+
+
+def encoder_drives(model: GeneratedModel, signals: Signals, drives: Drives | None = None) -> Drives | None:
+    """The drives between the joints and the encoders of reader counts; None where encoders are on the joint side."""
+    if signals.side == "joint":
+        return None
+    drives = drives or drives_of(model)
+    if drives is None:
+        raise SettingsError(
+            f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("signals", "side")
+        )
+    return drives
+
+
+def encoder_position(q: Array, drives: Drives | None) -> Array:
+    """Positions at the encoders, shape (N, n), of joint positions q."""
+    return q if drives is None else drives.motor_position(q)
+
+
+def encoder_root(drives: Drives | None, n: int) -> Array:
+    """Joint motion per encoder motion, shape (n, n): the identity on the joint side, R^-1 on the motor side."""
+    if drives is None:
+        return np.eye(n)
+    return np.asarray(drives.joint_position(np.eye(n)).T - drives.joint_position(np.zeros((1, n))).T)
