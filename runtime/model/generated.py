@@ -7,7 +7,8 @@ module given by path is parsed before it runs (`runtime.model.loading`), so that
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -117,12 +118,18 @@ class ModelText:
 
     def load(self) -> GeneratedModel:
         """The model; ModelError where the text is not the one that was sent, or not an emitted one."""
+        with self.stored() as path:
+            return load_model(path)
+
+    @contextmanager
+    def stored(self) -> Iterator[Path]:
+        """A file of the text, while the context lasts; ModelError where the text is not the one that was sent."""
         if sha256(self.text.encode("utf-8")).hexdigest() != self.digest:
             raise ModelError(f"the text that arrived is not the one that was sent, SHA-256 {self.digest[:12]}", file=self.name)
         with TemporaryDirectory(prefix="symgen-") as folder:
             path = Path(folder) / self.name
             path.write_text(self.text, encoding="utf-8")
-            return load_model(path)
+            yield path
 
 
 def checked_model(module: ModuleType) -> GeneratedModel:

@@ -23,8 +23,9 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.linear import assemble
-from runtime.estimators.methods import linear_system
+from runtime.estimators.closed_loop import LoopSimulator
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import estimate_of
 from runtime.model.compile_cache import processor
 from runtime.model.compiled import target_of, text_of
 from runtime.model.drives import Drives
@@ -34,9 +35,10 @@ from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.c.workspace import usable
 from runtime.resolution.checkpoint import Checkpoint
-from runtime.resolution.perturbed import Task, perturbed, prepared, study_columns
+from runtime.resolution.loop import Loop, LoopText, loop_of, without_loop_options
+from runtime.resolution.perturbed import Task, column_errors, perturbed, prepared_records, study_columns, with_deviation
 from runtime.resolution.result import Cestac, level_result
-from runtime.resolution.run import forget, run_block
+from runtime.resolution.run import USABLE, forget, run_block
 from runtime.resolution.runs import Level, Runs
 from runtime.settings.study import CestacSettings, Study, to_mapping
 
@@ -59,8 +61,9 @@ def cestac(
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     provenance: Mapping[str, Any] | None = None,
+    simulator: LoopSimulator | None = None,
 ) -> Cestac:
-    """Change of the least-squares estimate under coarser encoders and torque sensors, by the settings study.cestac.
+    """Change of the estimate under coarser encoders and torque sensors, by the settings study.cestac and the method of study.estimate.
 
     Parameters
     ----------
@@ -87,13 +90,15 @@ def cestac(
         Where runs are kept while the study lasts; those of an interrupted or shorter study with the same settings are not repeated.
     provenance : mapping, optional
         Further entries of Cestac.provenance; names and time stamps of the records are there.
+    simulator : LoopSimulator, optional
+        Closed loop of iv, didim, cloe, and of place: loop; default: that of study.controller, with the CasADi model beside `model`.
 
     Raises
     ------
     SettingsError
-        Motor side without drives, or a column that is no base parameter.
+        Motor side without drives, a column that is no base parameter, or a closed loop that the study does not tell.
     InputError
-        Both workers and a scheduler.
+        Both workers and a scheduler; a method that finds no estimate, or fewer than two at one of the steps.
     """
     study = study or Study()
     settings, model = study.cestac, usable(model)
@@ -105,19 +110,31 @@ def cestac(
         )
     if scheduler and workers:
         raise InputError("a scheduler has workers of its own; leave out workers")
+    loop = loop_of(model, records, study, simulator)
+    if loop is not None and constants:
+        raise InputError(f"constants with {study.estimate.method} or place: loop; the loop is that of the robot file, change it there")
+    if settings.place == "loop":
+        assert loop is not None
+        records = tuple(part.record for part in loop.closed.parts)
+    if loop is not None:
+        study = replace(study, estimate=without_loop_options(study.estimate))
     task = Task(
-        records=tuple(prepared(record, study) for record in records),
+        records=prepared_records(records, study, loop),
         model=model,
-        names=study_columns(model, records, study, columns, constants),
+        names=study_columns(model, records, study, columns, constants, loop),
         estimate=replace(study.estimate, columns="all"),
         settings=settings,
         levels=levels_of(settings),
         drives=drives,
         constants=dict(constants or {}),
+        loop=loop,
     )
+    if study.estimate.method == "tls":
+        task = replace(task, errors=column_errors(model, records, study, task.names))
     measured = perturbed(model, task, Level(0.0), ())
-    system = linear_system(measured, task.estimate)
-    reference = assemble(system, system.solve(), model=model, provenance={**origin(records), **(provenance or {})})
+    origins = {**origin(records), **(provenance or {})}
+    reference = estimate_of(*with_deviation(measured, task, Level(0.0)), model=model, provenance=origins)
+    _refuse(reference)
     described = {
         **measured.settings,
         "estimate": to_mapping(study.estimate),
@@ -125,6 +142,7 @@ def cestac(
         "rate": [record.rate for record in records],
         "target": target_of(model),
         "torque_side": "joint" if drives is None else "motor",
+        **({} if loop is None else {"controller": to_mapping(loop.simulator.controller)}),
     }
     runs = _all_runs(task, _identity(task, described, reference.provenance), workers, scheduler, progress, checkpoint)
     return Cestac(
@@ -133,7 +151,34 @@ def cestac(
         levels=tuple(level_result(level, runs.where(runs.level == k), measured, reference) for k, level in enumerate(task.levels)),
         settings=described,
         provenance={**reference.provenance, "seed": settings.seed, "processor": processor()},
+        notes=notes(study, loop),
     )
+
+
+def notes(study: Study, loop: Loop | None) -> tuple[str, ...]:
+    """What the reader of a study must know beside its figures."""
+    method, place = study.estimate.method, study.cestac.place
+    if loop is None:
+        return ()
+    told = [loop.closed.assumption] if loop.closed.assumption else []
+    if place == "loop":
+        told.append(
+            "The encoder rounds inside the simulated loop, whose parameters are the values of the robot file; every run is a record of its own."
+        )
+    elif method in ("didim", "cloe"):
+        told.append(
+            f"{method} reads of the recorded positions {'the first alone' if method == 'didim' else 'what the loop does not explain'}; rounding them "
+            "says nothing of an encoder in the loop, whose controller answers its steps: place: loop does."
+        )
+    elif method == "iv":
+        told.append("The instruments of iv know no rounding of recorded positions; what an encoder in the loop does to them: place: loop.")
+    return tuple(told)
+
+
+def _refuse(reference: Estimate) -> None:
+    """InputError where the method finds no estimate that runs could be compared with."""
+    if reference.status not in (*USABLE, "rank-deficient", "no-redundancy", "singular-weights"):
+        raise InputError(f"{reference.method}: no estimate of the record as measured to compare with: {reference.message}")
 
 
 def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
@@ -188,7 +233,8 @@ def _results(task: Task, blocks: Sequence[tuple[Key, ...]], workers: int, schedu
     """Blocks of runs, from this process, several, or a cluster."""
     if not blocks or not (workers or scheduler):
         return results(run_block, task, blocks)
-    sent = replace(task, model=text_of(cast(GeneratedModel, task.model)))
+    loop = LoopText.of(task.loop) if isinstance(task.loop, Loop) else None
+    sent = replace(task, model=text_of(cast(GeneratedModel, task.model)), loop=loop)
     return results(run_block, sent, blocks, workers, scheduler=scheduler)
 
 

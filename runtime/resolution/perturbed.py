@@ -15,13 +15,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime.estimators.essential import essential_of
+from runtime.estimators.methods import linear_companion, observed, point_estimate
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, ModelText, base_columns
 from runtime.observation.filters import filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, stack
 from runtime.observation.rows import Selection, select_rows
 from runtime.records.record import Record
-from runtime.resolution.rounding import rounded, stream
+from runtime.resolution.loop import Loop, LoopText
+from runtime.resolution.rounding import VARIANCE, rounded, stream
 from runtime.resolution.runs import Level
 from runtime.settings.study import CestacSettings, EstimateSettings, Study
 
@@ -70,6 +72,10 @@ class Task:
         Motor side.
     constants : mapping
         Values in place of the robot file's.
+    loop : Loop, LoopText or None
+        Closed loop, or its text for another process, of a study that simulates one.
+    errors : ndarray, shape (n, b, b), or None
+        Of method tls: covariance of the errors of one row of joint j, by encoder errors of variance 1.
     """
 
     records: tuple[PreparedRecord, ...]
@@ -80,6 +86,13 @@ class Task:
     levels: tuple[Level, ...]
     drives: Drives | None
     constants: Mapping[str, float]
+    loop: Loop | LoopText | None = None
+    errors: Array | None = None
+
+    def opened(self) -> tuple[Task, GeneratedModel]:
+        """The task and the model as they run in this process."""
+        model = self.model.load() if isinstance(self.model, ModelText) else self.model
+        return (replace(self, loop=self.loop.load(model)) if isinstance(self.loop, LoopText) else self), model
 
 
 def prepared(record: Record, study: Study) -> PreparedRecord:
@@ -89,16 +102,38 @@ def prepared(record: Record, study: Study) -> PreparedRecord:
     return PreparedRecord(record.q, record.tau, record.rate, dict(record.files), selection, decimated_torque(record.tau, selection))
 
 
+def prepared_records(records: Sequence[Record], study: Study, loop: Loop | None = None) -> tuple[PreparedRecord, ...]:
+    """Rows and torques of every record; where a loop is simulated, rows are those of its reference, and of an encoder inside it none are kept."""
+    if loop is None:
+        return tuple(prepared(record, study) for record in records)
+    if study.cestac.place == "loop":
+        return ()
+    parts = zip(records, loop.closed.parts, strict=True)
+    return tuple(PreparedRecord(r.q, r.tau, r.rate, dict(r.files), part.selection, part.torque) for r, part in parts)
+
+
+def column_errors(model: GeneratedModel, records: Sequence[Record], study: Study, names: Sequence[str]) -> Array | None:
+    """Covariance of the errors of one row of joint j, shape (n, b, b), by encoder errors of variance 1, for method tls."""
+    signals = replace(study.signals, median=study.cestac.median)
+    unit = EstimateSettings("tls", options={"position_error": 1.0})
+    return observed(model, records, replace(study, signals=signals, estimate=unit)).columns(names).errors
+
+
 def study_columns(
-    model: GeneratedModel, records: Sequence[Record], study: Study, columns: Sequence[str] | None, constants: Mapping[str, float] | None
+    model: GeneratedModel,
+    records: Sequence[Record],
+    study: Study,
+    columns: Sequence[str] | None,
+    constants: Mapping[str, float] | None,
+    loop: Loop | None = None,
 ) -> tuple[str, ...]:
     """Columns of study.cestac.columns: a list, all, or the essential ones of the identification that `study` describes.
 
     columns : essential names where they are known.   Raises SettingsError for a name that is no base parameter.
     """
     if study.cestac.columns == "essential" and columns is None:
-        observations = [observe(model, record, study, constants=constants) for record in records]
-        return essential_of(stack(observations), study.essential, study.estimate).names
+        seen = stack([observe(model, record, study, constants=constants) for record in records]) if loop is None else loop.closed.measured()
+        return essential_of(seen, study.essential, linear_companion(study.estimate)).names
     return base_columns(model, study.cestac.columns, columns or (), "cestac", "columns")
 
 
@@ -113,8 +148,8 @@ def perturbed_position(q: Array, level: Level, settings: CestacSettings, drives:
         return q
     rng = stream(settings.seed, *key)
     if settings.side == "joint" or drives is None:
-        return rounded(q, level.delta, settings.rounding, rng)
-    return drives.joint_position(rounded(drives.motor_position(q), level.delta, settings.rounding, rng))
+        return rounded(q, level.delta, settings.rounding, rng, settings.uneven)
+    return drives.joint_position(rounded(drives.motor_position(q), level.delta, settings.rounding, rng, settings.uneven))
 
 
 def perturbed_torque(tau: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]) -> Array:
@@ -135,9 +170,15 @@ def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[
 
 def perturbed(model: GeneratedModel, task: Task, level: Level, draw: tuple[int, ...]) -> Observation:
     """The system with perturbed measurements; that of the measurements themselves at a level without steps."""
+    loop = task.loop
+    assert not isinstance(loop, LoopText)
+    if loop is not None and task.settings.place == "loop":
+        return (loop.simulated(level, draw) if level.delta else loop.closed).measured().columns(task.names)
     keys = [stream_keys(draw, k) for k in range(len(task.records))]
     positions = [perturbed_position(r.q, level, task.settings, task.drives, own) for r, (own, _) in zip(task.records, keys, strict=True)]
-    return system_of(model, task, positions, [torque_rows(task, r, level, own) for r, (_, own) in zip(task.records, keys, strict=True)])
+    torques = [torque_rows(task, r, level, own) for r, (_, own) in zip(task.records, keys, strict=True)]
+    observation = system_of(model, task, positions, torques)
+    return observation if loop is None else loop.perturbed(observation, positions)
 
 
 def system_of(model: GeneratedModel, task: Task, positions: Sequence[Array], torques: Sequence[Array]) -> Observation:
@@ -155,3 +196,13 @@ def system_of(model: GeneratedModel, task: Task, positions: Sequence[Array], tor
         for record, q, torque in zip(task.records, positions, torques, strict=True)
     ]
     return observations[0] if len(observations) == 1 else stack(observations)
+
+
+def with_deviation(observation: Observation, task: Task, level: Level) -> tuple[Observation, EstimateSettings]:
+    """The observation and the settings of its estimate; method tls is told the deviation of the positions, that of the level included."""
+    settings = point_estimate(task.estimate)
+    if settings.method != "tls":
+        return observation, settings
+    variance = float(settings.options.get("position_error", 0.0)) ** 2 + VARIANCE[task.settings.rounding] * level.delta**2
+    errors = None if task.errors is None else variance * task.errors
+    return replace(observation, errors=errors), replace(settings, options={**settings.options, "position_error": variance**0.5})

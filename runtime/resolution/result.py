@@ -28,7 +28,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 from scipy.special import stdtrit
 
+from runtime.errors import InputError
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import LINEAR
 from runtime.json_documents import Vector, json_text
 from runtime.latex import error_table, level_table
 from runtime.markup import number
@@ -125,6 +127,8 @@ class Cestac:
     settings : mapping
         Signals, rows, estimator, study and sampling rate, complete: the bandwidth of the noise decides the result.
     provenance : mapping
+    notes : tuple of str
+        What the figures do not say.
     """
 
     names: tuple[str, ...]
@@ -132,6 +136,7 @@ class Cestac:
     levels: tuple[LevelResult, ...]
     settings: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return self.to_table()
@@ -154,7 +159,7 @@ class Cestac:
     def to_table(self) -> str:
         """Means as the chapter's Table 3, residual and verdict, then %e with %sigma, then every verdict in words."""
         means, residual, errors = self.mean_table(), self.residual_table(), self.error_table()
-        notes = "\n".join(f"{r.level.label}: {r.message}" for r in self.levels)
+        notes = "\n".join([*(f"{r.level.label}: {r.message}" for r in self.levels), *self.notes])
         return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{errors.caption}\n{errors.to_text()}"
 
     def mean_table(self) -> Table:
@@ -221,6 +226,7 @@ class Cestac:
             "levels": [self._level_summary(level) for level in self.levels],
             "settings": self.settings,
             "provenance": self.provenance,
+            "notes": self.notes,
         }
 
     def _level_summary(self, level: LevelResult) -> dict[str, Any]:
@@ -237,9 +243,16 @@ def deciding_names(reference: Estimate) -> tuple[str, ...]:
 
 def level_result(level: Level, runs: Runs, measured: Observation, reference: Estimate) -> LevelResult:
     """Eqs. (18)-(22) and the verdict of one level; `measured` is the unperturbed system with the columns of the runs."""
+    found = np.isfinite(runs.X).all(axis=1)
+    runs, failed = runs.where(found), int(np.sum(~found))
     X, N = runs.X, len(runs)
+    if N < 2:
+        raise InputError(
+            f"{reference.method} finds {N} estimates of {N + failed} runs at {level.label}; use smaller steps, or another method"
+        )
     mean, sigma = X.mean(axis=0), X.std(axis=0, ddof=1)
-    rho_ls, norm_Y = reference.residual_norm, float(np.linalg.norm(measured.Y))
+    norm_Y = float(np.linalg.norm(measured.Y))
+    rho_ls = reference.residual_norm if reference.method in LINEAR else float(np.linalg.norm(measured.Y - measured.W @ reference.X))
     rho = float(np.linalg.norm(measured.Y - measured.W @ mean))
     own = float(runs.residual_norm.mean())
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -268,7 +281,8 @@ def level_result(level: Level, runs: Runs, measured: Observation, reference: Est
         residual_verdict=_judged(100 * abs(rho - rho_ls) / norm_Y),
         decided_by=decided_by,
         runs_needed=needed,
-        message=_message(verdict, decided_by, reference, decisive, N, float(half * spread[decisive].max(initial=0.0)), needed),
+        message=_message(verdict, decided_by, reference, decisive, N, float(half * spread[decisive].max(initial=0.0)), needed)
+        + (f" {failed} of {N + failed} runs found no estimate and are left out." if failed else ""),
     )
 
 

@@ -17,19 +17,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.estimators.methods import linear_system
+from runtime.estimators.methods import LINEAR, estimate_of, linear_system
 from runtime.estimators.normal_equations import LeastSquares, least_squares
 from runtime.model.compiled import CompiledModel
-from runtime.model.generated import GeneratedModel, ModelText
+from runtime.model.generated import GeneratedModel
 from runtime.model.narrowing import narrowed
 from runtime.observation.filters import States, decimation_plan, filtered_states
 from runtime.observation.regressor_signals import DecimatedSignals, distinct_entries
 from runtime.resolution.c.workspace import CompiledWorkspace
-from runtime.resolution.perturbed import PreparedRecord, Task, perturbed, perturbed_position, stream_keys, torque_rows
+from runtime.resolution.perturbed import PreparedRecord, Task, perturbed, perturbed_position, stream_keys, torque_rows, with_deviation
 from runtime.resolution.rounding import ADDED, noise, stream
 from runtime.resolution.runs import TRIANGULAR, Level, Run, Runs
 
 Array = np.ndarray
+
+USABLE = ("ok", "weak-instruments")  # Status of an estimate that counts as a run
 
 
 def run_block(task: Task, keys: Sequence[tuple[int, int]]) -> Runs:
@@ -42,14 +44,27 @@ def one_run(task: Task, key: tuple[int, int]) -> Run:
     number, run = key
     level, work = task.levels[number], workspace(task)
     draw = (run,) if task.settings.common else (number, run)
-    if task.estimate.method != "ols" or task.estimate.options:
-        system = linear_system(perturbed(work.model, task, level, draw), task.estimate)
+    if task.estimate.method not in LINEAR:
+        return _estimated(work, key, level, draw)
+    if task.estimate.method != "ols" or task.estimate.options or task.loop is not None:
+        system = linear_system(perturbed(work.model, work.task, level, draw), task.estimate)
         X = system.solve().X
         norms, method = np.array([joint.residual_norm(X) for joint in system.raw.joints]), TRIANGULAR
     else:
         fit = work.fit(level, draw)
         X, norms, method = fit.X, fit.residual_norms, fit.method
     return Run(number, run, tuple(X.tolist()), float(np.linalg.norm(norms)), method)
+
+
+def _estimated(work: Workspace, key: tuple[int, int], level: Level, draw: tuple[int, ...]) -> Run:
+    """A run of a method that is not one linear system; X of nan where it finds no estimate."""
+    observation = perturbed(work.model, work.task, level, draw)
+    try:
+        estimate = estimate_of(*with_deviation(observation, work.task, level), model=work.model)
+        X = estimate.X if estimate.status in USABLE else np.full(len(observation.names), np.nan)
+    except InputError:
+        X = np.full(len(observation.names), np.nan)
+    return Run(*key, tuple(X.tolist()), float(np.linalg.norm(observation.Y - observation.W @ X)))
 
 
 class NumpyWorkspace:
@@ -138,8 +153,8 @@ _kept = threading.local()  # task and workspace of the last run of this thread
 def workspace(task: Task) -> Workspace:
     """The workspace of a task, made at its first run in this thread."""
     if getattr(_kept, "task", None) is not task:
-        model = task.model.load() if isinstance(task.model, ModelText) else task.model
-        _kept.work = CompiledWorkspace(task, model) if isinstance(model, CompiledModel) else NumpyWorkspace(task, model)
+        own, model = task.opened()
+        _kept.work = CompiledWorkspace(own, model) if isinstance(model, CompiledModel) else NumpyWorkspace(own, model)
         _kept.task = task
     work: Workspace = _kept.work
     return work

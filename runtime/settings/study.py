@@ -239,7 +239,11 @@ class CestacSettings(Settings):
     side : str
         Side of the encoder: joint or motor.
     rounding : str
-        Law of the perturbations.
+        Law of the perturbations; phase is that of a real encoder: counts of steps whose phase is random by joint and run.
+    uneven : float
+        Deviation of the lines of law phase from even spacing, in steps.
+    place : str
+        What is rounded: the positions of the record, or, in the closed loop of study.controller simulated anew in every run, its encoder.
     delta : tuple of float, rad or m
         Steps of the perturbed position.
     runs : int
@@ -257,7 +261,9 @@ class CestacSettings(Settings):
     """
 
     side: Literal["joint", "motor"] = "joint"
-    rounding: Literal["two-point", "uniform", "gaussian", "quantise"] = "two-point"
+    rounding: Literal["two-point", "uniform", "gaussian", "quantise", "phase"] = "two-point"
+    uneven: Annotated[Real, Field(ge=0, le=0.5)] = 0.0
+    place: Literal["record", "loop"] = "record"
     delta: Many[Positive] = (2 * pi / 10000, 2 * pi / 5000, 2 * pi / 2000, 2 * pi / 1000)
     runs: Annotated[Whole, Field(ge=2)] = 5
     seed: Seed = 1
@@ -265,6 +271,16 @@ class CestacSettings(Settings):
     torque: Many[Real] | None = None
     common: Flag = False
     median: OddWindow = 1
+
+    def __post_init__(self) -> None:
+        law, loop = self.rounding, self.place == "loop"
+        require(not self.uneven or law == "phase", f"{self.uneven} with rounding: {law}; uneven lines belong to rounding: phase", "uneven")
+        require(
+            not (self.common and law == "phase"), "the phase of rounding: phase is drawn anew for every step; set common: false", "common"
+        )
+        require(not loop or law == "phase", f"{law} with place: loop; the encoder in the loop rounds by the law phase alone", "rounding")
+        require(not (loop and self.uneven), f"{self.uneven} with place: loop; the encoder in the loop has even lines", "uneven")
+        require(not (loop and self.torque), "with place: loop; steps of the torque there are controller.torque.step", "torque")
 
 
 class Study(Settings):

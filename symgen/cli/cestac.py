@@ -22,7 +22,16 @@ def cestac(
     delta: Annotated[list[str] | None, typer.Option(help="Position step, rad or m, such as 2*pi/5000; repeat for several.")] = None,
     torque: Annotated[list[str] | None, typer.Option(help="Motor torque step, N m or N; repeat for several.")] = None,
     runs: Annotated[int | None, typer.Option(help="Runs per step, at least 2.")] = None,
-    rounding: Annotated[str | None, typer.Option(help="two-point, uniform, gaussian or quantise.")] = None,
+    rounding: Annotated[
+        str | None, typer.Option(help="two-point, uniform, gaussian, quantise; or phase: counts of a real encoder, of random phase.")
+    ] = None,
+    uneven: Annotated[float | None, typer.Option(help="Deviation of the lines of --rounding phase, in steps, such as 0.1.")] = None,
+    method: Annotated[
+        str | None, typer.Option(help="Estimator in place of the study's: ols, wls, irls, tls, iv, didim, cloe, feasible.")
+    ] = None,
+    place: Annotated[
+        str | None, typer.Option(help="record: recorded positions are rounded; loop: the encoder of the study's closed loop, in every run.")
+    ] = None,
     side: Annotated[str | None, typer.Option(help="joint or motor: where positions are rounded.")] = None,
     columns: Annotated[str | None, typer.Option(help="essential, all, or names separated by commas.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random rounding.")] = None,
@@ -39,14 +48,23 @@ def cestac(
     target: Annotated[str, typer.Option(help="numpy, or c: compiled runs, about six times as many a second.")] = "numpy",
     json: Annotated[bool, typer.Option("--json", help="Print cestac.json (advice.json) instead of tables.")] = False,
 ) -> None:
-    """Study the encoder resolution. Exit code 1 where least squares is biased at one of the steps.
+    """Study the encoder resolution. Exit code 1 where the estimate is biased at one of the steps.
 
     With --advise, exit code 1 where it would be at one of the steps of --delta, or where the runs contradict the prediction.
 
     A long study with -o keeps its runs in DIR/runs as it goes: interrupted or killed, the same command goes on.
     """
     single_thread()
-    given = {"delta": delta, "torque": torque, "runs": runs, "rounding": rounding, "side": side, "seed": seed}
+    given = {
+        "delta": delta,
+        "torque": torque,
+        "runs": runs,
+        "rounding": rounding,
+        "uneven": uneven,
+        "place": place,
+        "side": side,
+        "seed": seed,
+    }
     with reported_errors(), reserved(output) as results:
         import runtime
         from runtime.records.reading import read_records
@@ -54,7 +72,11 @@ def cestac(
         from runtime.resolution.checkpoint import Checkpoint
 
         model = session.model_of(robot, "numpy" if advise else target)
-        study = session.changed(session.study_of_arguments(record), "cestac", **given, columns=session.names_of(columns))
+        study = session.study_of_arguments(record, recorded=False)
+        study = session.changed(study, "cestac", **given, columns=session.names_of(columns))
+        if study.cestac.place == "record":
+            session.require_record(study, record[0])
+        study = session.changed(study, "estimate", method=method)
         records = read_records(study.record, model)
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice
@@ -64,8 +86,9 @@ def cestac(
                     result = advice = runtime.advise(model, records, study, asked=study.cestac.delta if delta else (), progress=progress)
                     text, negative = f"{advice.to_table()}\n\n{advice.verdict}", advice.negative
                 else:
-                    place: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint}
-                    result = resolution = runtime.cestac(model, records, study, progress=progress, **place)
+                    simulator = session.simulator_of(robot, model, study, needed=study.cestac.place == "loop")
+                    where: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint}
+                    result = resolution = runtime.cestac(model, records, study, simulator=simulator, progress=progress, **where)
                     text, negative = resolution_text(resolution), resolution.verdict == "biased"
         except KeyboardInterrupt:
             session.stopped(checkpoint)

@@ -146,11 +146,11 @@ def symbolic_path(robot: str, model: GeneratedModel) -> Path:
         raise ModelError(f"{model.NAME} has joints that only its closure equations tie; there is no CasADi model of it") from e
 
 
-def simulator_of(robot: str, model: GeneratedModel, study: Study) -> Simulator | None:
-    """The closed loop of the study where its method simulates one; else None."""
+def simulator_of(robot: str, model: GeneratedModel, study: Study, *, needed: bool = False) -> Simulator | None:
+    """The closed loop of the study where its method simulates one, or where it is `needed`; else None."""
     from runtime.estimators.methods import CLOSED_LOOP
 
-    if study.estimate.method not in CLOSED_LOOP or study.controller is None:
+    if not (needed or study.estimate.method in CLOSED_LOOP) or study.controller is None:
         return None
     from runtime.model.casadi import load_symbolic
     from runtime.motion.simulation import Simulator
@@ -170,8 +170,8 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     from runtime.settings.location import located
 
     study = located(*study_of(records[0]))
-    if recorded and not study.record:
-        raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=records[0])
+    if recorded:
+        require_record(study, records[0])
     further = []
     for record in records[1:]:
         path = Path(record)
@@ -183,6 +183,14 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
             raise InputError("the first RECORD has its positions and torques in two files; name further pairs in record.also", file=record)
         further.append(replace(study.record[-1], files=(record,), dataset=None, name=None))
     return replace(study, record=(*study.record, *further))
+
+
+def require_record(study: Study, file: str) -> None:
+    """InputError where the study of that file names no record."""
+    from runtime.errors import InputError
+
+    if not study.record:
+        raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=file)
 
 
 def changed(study: Study, section: str, **given: Any) -> Study:

@@ -1,0 +1,168 @@
+"""The closed loop of a resolution study: for methods that simulate it (iv, didim, cloe), and for encoders that stand inside it.
+
+    place: record    the positions of the record are rounded; the loop is simulated without steps, as the method does on any record
+    place: loop      every run is a record simulated anew, the encoder of the loop with steps of Delta and a random phase for each encoder:
+
+        arm, controller and record answer      y = R^-1 (phi + Delta floor((R (q - offset) - phi)/Delta + 1/2)) + offset
+
+Rounding recorded positions alone tells nothing of a controller that answers encoder steps, and next to nothing of didim, which reads one position.
+In the loop every run has a seed of its own for phase, torque noise and disturbance, the same for every Delta and method. The record that the runs are
+compared with has the encoder that the study gives the controller: an exact one, if it gives none. `around` of estimate.options then serves every method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import SettingsError
+from runtime.estimators.closed_loop import ClosedLoop, LoopSimulator, closed_loop
+from runtime.estimators.methods import CLOSED_LOOP
+from runtime.model.casadi import load_symbolic
+from runtime.model.generated import GeneratedModel, ModelText
+from runtime.motion.reference import Reference, reference_of
+from runtime.observation.system import LoopRows, Observation
+from runtime.records.provenance import SIMULATED
+from runtime.records.record import Record
+from runtime.resolution.rounding import stream
+from runtime.resolution.runs import Level
+from runtime.settings.study import EstimateSettings, Study
+
+Array = np.ndarray
+
+ALIKE = ("around", "reference")  # estimate.options that are the loop's, whatever the method
+
+
+def has_loop(study: Study) -> bool:
+    """Whether the study simulates a closed loop."""
+    return study.cestac.place == "loop" or study.estimate.method in CLOSED_LOOP
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The loop of one study.
+
+    Attributes
+    ----------
+    model : GeneratedModel
+    study : Study
+        With the median of study.cestac in its signals.
+    simulator : LoopSimulator
+        Without steps of its own making: its law has the encoder of the study.
+    records : tuple of Record
+        Measured ones; of place loop, those that the reference may come from.
+    """
+
+    model: GeneratedModel
+    study: Study
+    simulator: LoopSimulator
+    records: tuple[Record, ...]
+
+    @property
+    def options(self) -> Mapping[str, Any]:
+        """estimate.options that are the loop's."""
+        return {key: self.study.estimate.options[key] for key in ALIKE if key in self.study.estimate.options}
+
+    @cached_property
+    def reference(self) -> Reference:
+        """What the controller follows, of place loop."""
+        return reference_of(self.simulator.controller, self.model, records=self.records)
+
+    @cached_property
+    def truth(self) -> Array:
+        """Base parameters of the simulated arm, shape (b,)."""
+        from runtime.motion.simulation import parameters_of
+
+        return parameters_of(self.model, self.simulator.controller)
+
+    @cached_property
+    def closed(self) -> ClosedLoop:
+        """The loop of the measured records; of place loop, of one made with the encoder of the study."""
+        if self.study.cestac.place == "record":
+            return closed_loop(self.model, self.records, self.study, self.simulator, **self.options)
+        return self._of(self.simulator, self.simulator.controller.seed)
+
+    def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
+        """`observation` of the perturbed positions of every record, shape (N, n), with the loop attached."""
+        parts = [replace(part, record=replace(part.record, q=np.asarray(q))) for part, q in zip(self.closed.parts, positions, strict=True)]
+        return replace(observation, closed_loop=LoopRows(replace(self.closed, parts=tuple(parts)), np.arange(len(observation.Y))))
+
+    def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
+        """The loop of a record made with encoders of steps of level.delta."""
+        random = stream(self.study.cestac.seed, draw[-1])
+        law, n = self.simulator.law, len(self.model.JOINTS)
+        phase = level.delta * random.random(n)
+        simulator: Any = copy(self.simulator)
+        simulator.law = replace(law, encoder_step=np.full(n, level.delta), offset=law.offset + np.linalg.solve(law.R, phase))
+        return self._of(simulator, int(random.integers(2**31)))
+
+    def _of(self, simulator: Any, seed: int) -> ClosedLoop:
+        """A record made by `simulator`, under the loop without its steps."""
+        record = simulator.run(self.truth, self.reference, seed=seed, name=f"{SIMULATED} {self.model.NAME}").record()
+        return closed_loop(self.model, [record], self.study, self.simulator, **self.options)
+
+
+@dataclass(frozen=True)
+class LoopText:
+    """The loop of one study for another process: its CasADi model as text."""
+
+    symbolic: ModelText
+    study: Study
+    records: tuple[Record, ...]
+
+    @classmethod
+    def of(cls, loop: Loop) -> LoopText:
+        """InputError where the CasADi model has no file."""
+        simulator: Any = loop.simulator
+        return cls(ModelText.of(simulator.symbolic), loop.study, loop.records)
+
+    def load(self, model: GeneratedModel) -> Loop:
+        """The loop of `model`."""
+        from runtime.motion.simulation import Simulator
+
+        assert self.study.controller is not None
+        with self.symbolic.stored() as path:
+            symbolic = load_symbolic(path, of=model)
+        return Loop(model, self.study, Simulator(model, self.study.controller, symbolic=symbolic), self.records)
+
+
+def loop_of(model: GeneratedModel, records: Sequence[Record], study: Study, simulator: LoopSimulator | None) -> Loop | None:
+    """The loop of a study that simulates one; else None. simulator : default: that of study.controller."""
+    if not has_loop(study):
+        return None
+    if study.controller is None:
+        asked = "place: loop" if study.cestac.place == "loop" else study.estimate.method
+        raise SettingsError(
+            f"{asked} simulates the closed loop, and this study tells none; give a section `controller` with law, rate and reference, "
+            "or use ols, wls, irls or tls on recorded positions",
+            path=("cestac", "place") if study.cestac.place == "loop" else ("estimate", "method"),
+        )
+    quiet = replace(study, signals=replace(study.signals, median=study.cestac.median))
+    if study.cestac.place == "loop":  # the encoder on the side of the study, of any step: only then is it in the law
+        encoder = replace(study.controller.encoder, side=study.cestac.side)
+        quiet = replace(quiet, controller=replace(study.controller, encoder=encoder))
+    made = simulator if simulator is not None and simulator.controller == quiet.controller else None
+    if made is None:
+        made = _simulator(model, quiet, simulator)
+    return Loop(model, quiet, made, tuple(records))
+
+
+def _simulator(model: GeneratedModel, study: Study, given: LoopSimulator | None) -> LoopSimulator:
+    """The simulator of study.controller, with the CasADi model of `given`."""
+    from runtime.motion.simulation import Simulator
+
+    known: Any = given
+    assert study.controller is not None
+    return Simulator(model, study.controller, symbolic=None if known is None else known.symbolic)
+
+
+def without_loop_options(settings: EstimateSettings) -> EstimateSettings:
+    """The settings as a method that simulates no loop takes them."""
+    if settings.method in CLOSED_LOOP:
+        return settings
+    return replace(settings, options={key: value for key, value in settings.options.items() if key not in ALIKE})
