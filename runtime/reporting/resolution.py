@@ -30,6 +30,7 @@ def resolution_section(
         "5 % biased. The chapter's section 4.1.4 calls the residual the best single indicator, as it sees the whole model: the last verdict applies "
         "the same limits to the increase of its norm alone.",
         *(f"{r.level.label}: {r.message}" for r in result.levels),
+        *result.notes,
     )
     return Section(title, text, [image] if image else [], [result.mean_table(), result.error_table(), result.residual_table()])
 
@@ -57,4 +58,5 @@ def resolution_verdict(result: Cestac) -> str:
         return "Nothing was perturbed."
     name, error = next(iter(worst.decided_by.items()))
     change = f"{'the residual' if name == 'rho' else name}, {error:.1f} % at {worst.level.label}"
-    return f"Least squares is {'; '.join(parts)}; largest change: {change}."
+    method = "Least squares" if result.estimator == "LS" else result.estimator
+    return f"{method} is {'; '.join(parts)}; largest change: {change}."

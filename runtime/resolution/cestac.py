@@ -116,6 +116,7 @@ def cestac(
     if settings.place == "loop":
         assert loop is not None
         records = tuple(part.record for part in loop.closed.parts)
+    asked = to_mapping(study.estimate)
     if loop is not None:
         study = replace(study, estimate=without_loop_options(study.estimate))
     task = Task(
@@ -137,7 +138,7 @@ def cestac(
     _refuse(reference)
     described = {
         **measured.settings,
-        "estimate": to_mapping(study.estimate),
+        "estimate": asked,
         "cestac": to_mapping(settings),
         "rate": [record.rate for record in records],
         "target": target_of(model),
@@ -145,10 +146,16 @@ def cestac(
         **({} if loop is None else {"controller": to_mapping(loop.simulator.controller)}),
     }
     runs = _all_runs(task, _identity(task, described, reference.provenance), workers, scheduler, progress, checkpoint)
+    by_level = [runs.where(runs.level == k) for k in range(len(task.levels))]
+    levels = list(zip(task.levels, by_level, strict=True))
+    if settings.place == "loop":
+        (_, exact), *levels = levels
+        X = np.nanmean(exact.X, axis=0)
+        reference = replace(reference, X=X, residual_norm=float(np.linalg.norm(measured.Y - measured.W @ X)))
     return Cestac(
         names=task.names,
         reference=reference,
-        levels=tuple(level_result(level, runs.where(runs.level == k), measured, reference) for k, level in enumerate(task.levels)),
+        levels=tuple(level_result(level, own, measured, reference) for level, own in levels),
         settings=described,
         provenance={**reference.provenance, "seed": settings.seed, "processor": processor()},
         notes=notes(study, loop),
@@ -163,7 +170,8 @@ def notes(study: Study, loop: Loop | None) -> tuple[str, ...]:
     told = [loop.closed.assumption] if loop.closed.assumption else []
     if place == "loop":
         told.append(
-            "The encoder rounds inside the simulated loop, whose parameters are the values of the robot file; every run is a record of its own."
+            "The encoder rounds inside the simulated loop, whose parameters are the values of the robot file; every run is a record of its own, compared "
+            "with the mean of as many records of the same seeds whose encoder is that of the study."
         )
     elif method in ("didim", "cloe"):
         told.append(
@@ -182,7 +190,9 @@ def _refuse(reference: Estimate) -> None:
 
 
 def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
-    """Positions alone for every Delta; then torques alone, and torques with the first Delta, for every Phi."""
+    """Positions alone for every Delta; then torques alone, and torques with the first Delta, for every Phi. In the loop, that of the study first."""
+    if settings.place == "loop":
+        return (Level(0.0), *map(Level, settings.delta))
     steps = settings.torque or ()
     with_position = [Level(settings.delta[0], phi) for phi in steps] if settings.delta else []
     return (*(Level(delta, 0.0) for delta in settings.delta), *(Level(0.0, phi) for phi in steps), *with_position)

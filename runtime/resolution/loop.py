@@ -6,8 +6,9 @@
         arm, controller and record answer      y = R^-1 (phi + Delta floor((R (q - offset) - phi)/Delta + 1/2)) + offset
 
 Rounding recorded positions alone tells nothing of a controller that answers encoder steps, and next to nothing of didim, which reads one position.
-In the loop every run has a seed of its own for phase, torque noise and disturbance, the same for every Delta and method. The record that the runs are
-compared with has the encoder that the study gives the controller: an exact one, if it gives none. `around` of estimate.options then serves every method.
+In the loop every run has a seed of its own for phase, torque noise and disturbance, the same for every Delta and method; so have the runs that they are
+compared with, whose encoder is that of the study (an exact one, if it gives none), so that %e is what the steps alone do. `around` of estimate.options
+then serves every method.
 """
 
 from __future__ import annotations
@@ -93,12 +94,13 @@ class Loop:
         return replace(observation, closed_loop=LoopRows(replace(self.closed, parts=tuple(parts)), np.arange(len(observation.Y))))
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """The loop of a record made with encoders of steps of level.delta."""
+        """The loop of a record made with encoders of steps of level.delta; of those of the study at a level without steps."""
         random = stream(self.study.cestac.seed, draw[-1])
         law, n = self.simulator.law, len(self.model.JOINTS)
         phase = level.delta * random.random(n)
         simulator: Any = copy(self.simulator)
-        simulator.law = replace(law, encoder_step=np.full(n, level.delta), offset=law.offset + np.linalg.solve(law.R, phase))
+        if level.delta:
+            simulator.law = replace(law, encoder_step=np.full(n, level.delta), offset=law.offset + np.linalg.solve(law.R, phase))
         return self._of(simulator, int(random.integers(2**31)))
 
     def _of(self, simulator: Any, seed: int) -> ClosedLoop:

@@ -173,7 +173,7 @@ def perturbed(model: GeneratedModel, task: Task, level: Level, draw: tuple[int, 
     loop = task.loop
     assert not isinstance(loop, LoopText)
     if loop is not None and task.settings.place == "loop":
-        return (loop.simulated(level, draw) if level.delta else loop.closed).measured().columns(task.names)
+        return (loop.simulated(level, draw) if draw else loop.closed).measured().columns(task.names)
     keys = [stream_keys(draw, k) for k in range(len(task.records))]
     positions = [perturbed_position(r.q, level, task.settings, task.drives, own) for r, (own, _) in zip(task.records, keys, strict=True)]
     torques = [torque_rows(task, r, level, own) for r, (_, own) in zip(task.records, keys, strict=True)]

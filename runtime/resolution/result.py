@@ -152,6 +152,11 @@ class Cestac:
         return max((result.verdict for result in self.levels), key=get_args(Verdict).index, default="unbiased")
 
     @property
+    def estimator(self) -> str:
+        """Name of the method in tables: LS for least squares, whatever its weights."""
+        return "LS" if self.reference.method in LINEAR else self.reference.method.upper()
+
+    @property
     def lists_runs(self) -> bool:
         """Whether the JSON text holds every run."""
         return sum(len(level.runs) for level in self.levels) <= LISTED
@@ -165,7 +170,7 @@ class Cestac:
     def mean_table(self) -> Table:
         """Mean of the runs of every parameter and level."""
         rows = [(name, number(self.reference.X[i]), *(number(r.mean[i]) for r in self.levels)) for i, name in enumerate(self.names)]
-        return Table("Mean of the runs (18)", ("parameter", "LS", *(r.level.label for r in self.levels)), rows)
+        return Table("Mean of the runs (18)", ("parameter", self.estimator, *(r.level.label for r in self.levels)), rows)
 
     def error_table(self) -> Table:
         """%e (21) and, in brackets, %sigma (20) of every parameter and level; `*` marks parameters that do not decide."""
@@ -178,7 +183,7 @@ class Cestac:
             for i, name in enumerate(self.names)
         ]
         caption = "%e (21) and, in brackets, %sigma (20); * does not decide"
-        return Table(caption, ("parameter", "%sigma of LS", *(r.level.label for r in self.levels)), rows)
+        return Table(caption, ("parameter", f"%sigma of {self.estimator}", *(r.level.label for r in self.levels)), rows)
 
     def residual_table(self) -> Table:
         """Both readings of %e(rho), the increase of the norm, and the verdict, by level."""
