@@ -1,12 +1,12 @@
-"""Every estimator on simulated records with known truth, the encoder inside the loop: bias and scatter against stated sigma, %e against Delta.
+"""Every estimator on simulated records with known truth, the encoder inside the loop: bias and scatter against stated sigma.
 
     python benchmarks/estimators.py [--records 100] [--cloe 10] [--workers 2] [-o docs]
 
 Each record has its own seed: torque noise on the record, and a disturbance of the arm that nobody records. Estimates are kept in
 estimators_runs.jsonl as they come; the same command goes on from there. Written: estimators_simulated.md, estimators.png (bias and
-scatter by parameter), cestac_estimators.png (%e against Delta). Simulating methods start 15 % from the truth, a different way in each record.
+scatter by parameter). Simulating methods start 15 % from the truth, a different way in each record. %e against Delta: cestac_estimators.py.
 
-EMPS needs its record for the reference (`symgen datasets`). `recorded`: positions of one record made with an exact encoder, rounded afterwards.
+EMPS needs its record for the reference (`symgen datasets`).
 """
 
 # ruff: noqa: E402
@@ -69,13 +69,12 @@ UNIT = {"tx40": "rad", "emps": "m"}
 
 
 class Key(NamedTuple):
-    """One record: robot, step of the encoder (0: exact), seed, method, and whether the steps were put into the recorded positions alone."""
+    """One record: robot, step of the encoder (0: exact), seed, methods."""
 
     robot: str
     step: float
     seed: int
     methods: tuple[str, ...]
-    recorded: bool = False
 
 
 class Bench(NamedTuple):
@@ -112,9 +111,7 @@ def with_encoder(robot: str, step: float) -> Simulator:
 def made(key: Key) -> tuple[Record, ClosedLoop]:
     """The record and its loop."""
     b = bench(key.robot)
-    record = with_encoder(key.robot, 0.0 if key.recorded else key.step).run(b.truth, b.reference, seed=key.seed).record()
-    if key.recorded and key.step:
-        record = replace(record, q=key.step * np.floor(record.q / key.step + np.random.default_rng(key.seed).random(record.q.shape)))
+    record = with_encoder(key.robot, key.step).run(b.truth, b.reference, seed=key.seed).record()
     loop = closed_loop(b.model, [replace(record, q_r=b.reference.q)], b.study, b.simulator, around=AROUND[key.robot])
     return record, loop
 
@@ -139,7 +136,7 @@ def estimates(_: None, key: Key) -> list[dict[str, Any]]:
     seen, found = loop.measured(), []
     for method in key.methods:
         begun = time.process_time()
-        row = {"robot": key.robot, "step": key.step, "seed": key.seed, "recorded": key.recorded, "method": method}
+        row = {"robot": key.robot, "step": key.step, "seed": key.seed, "method": method}
         try:
             e = estimate_of(_rows(b, record, seen, method, key), settings_of(b, method, key), model=b.model)
             row |= {"X": e.X.tolist(), "sigma": e.sigma.tolist(), "corrected": e.sigma_corrected.tolist(), "status": e.status}
@@ -161,15 +158,13 @@ def wanted(records: int, cloe: Mapping[str, int]) -> Iterator[Key]:
                 yield Key(robot, step, seed, METHODS)
                 if seed < cloe[robot]:
                     yield Key(robot, step, seed, ("cloe",))
-                if seed < 3:
-                    yield Key(robot, step, seed, ("ols", "iv", "didim"), recorded=True)
 
 
 def computed(file: Path, keys: Sequence[Key], workers: int) -> list[dict[str, Any]]:
     """Rows of the file, with those of the keys that were not there."""
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-    there = {(r["robot"], r["step"], r["seed"], r["recorded"], r["method"]) for r in rows}
-    missing = [key for key in keys if (key.robot, key.step, key.seed, key.recorded, key.methods[0]) not in there]
+    there = {(r["robot"], r["step"], r["seed"], r["method"]) for r in rows}
+    missing = [key for key in keys if (key.robot, key.step, key.seed, key.methods[0]) not in there]
     with file.open("a") as out:
         for found in results(estimates, None, missing, workers):
             rows += found
@@ -195,18 +190,10 @@ class Summary(NamedTuple):
     sigma: Array
     corrected: Array
 
-    @property
-    def error(self) -> Array:
-        """Root mean square of the error."""
-        return np.sqrt(self.bias**2 + self.scatter**2)
 
-
-def summary(
-    rows: Sequence[Mapping[str, Any]], robot: str, step: float, method: str, kept: Sequence[int], *, recorded: bool = False
-) -> Summary | None:
+def summary(rows: Sequence[Mapping[str, Any]], robot: str, step: float, method: str, kept: Sequence[int]) -> Summary | None:
     """None where nothing was estimated."""
-    wanted_key = (robot, step, method, recorded)
-    mine = [r for r in rows if (r["robot"], r["step"], r["method"], r["recorded"]) == wanted_key]
+    mine = [r for r in rows if (r["robot"], r["step"], r["method"]) == (robot, step, method)]
     good = [r for r in mine if r["status"] == "ok"]
     if not good:
         return None
@@ -294,37 +281,6 @@ def bias_figure(rows: Sequence[Mapping[str, Any]], kept: Mapping[str, Sequence[i
     return figure
 
 
-def error_figure(rows: Sequence[Mapping[str, Any]], kept: Mapping[str, Sequence[int]]) -> Figure:
-    """%e, root mean square over records and determined parameters, against Delta; dashed: recorded positions alone rounded."""
-    figure = Figure(figsize=(11, 4.2), layout="constrained")
-    for axes, robot in zip(figure.subplots(1, 2), kept, strict=True):
-        for k, method in enumerate((*METHODS, "cloe")):
-            for recorded, style in ((False, "-"), (True, "--")):
-                points = [
-                    (d, s) for d in STEPS[robot] if (s := summary(rows, robot, d, method, kept[robot], recorded=recorded)) is not None
-                ]
-                if points:
-                    label = method.upper() + (", recorded positions alone" if recorded else "")
-                    axes.loglog(
-                        *zip(*((d, _rms(s.error)) for d, s in points), strict=True),
-                        style,
-                        marker="o",
-                        ms=3,
-                        lw=1.2,
-                        color=f"C{k}",
-                        label=label,
-                    )
-        axes.set(
-            xlabel=f"Delta, {UNIT[robot]}, joint side",
-            ylabel="%e, rms over parameters and records",
-            title=f"{robot}, encoder inside the loop",
-        )
-        _at_steps(axes, robot)
-        axes.grid(True, which="major", lw=0.4, alpha=0.6)
-        axes.legend(fontsize=6.5)
-    return figure
-
-
 def _at_steps(axes: Any, robot: str) -> None:
     """Ticks at the steps that were tried."""
     axes.set_xticks(STEPS[robot], [f"{step:.3g}" for step in STEPS[robot]])
@@ -349,8 +305,9 @@ Read: where OLS is biased by more than 5 %, DIDIM is about five times less biase
 joint 2 and ZZ3R keep more (last columns). Likely because a loop that answers encoder steps no longer moves like the one without them, and
 sign(qd) of such a motion, filtered, is in W. WLS and TLS do not help on the TX40: both suppose errors that are independent of the torque, and inside
 the loop the torque answers them. Output error in position is the first to break (EMPS, coarsest step). Stated sigma is above the scatter where the
-encoder is coarse: its residuals repeat from record to record. Dashed: steps put into the recorded positions alone, by the random rounding of CESTAC.
-DIDIM does not see them at all, which says nothing about the encoder in the loop; OLS sees more of them than of steps in the loop, but for the coarsest of the TX40.
+encoder is coarse: its residuals repeat from record to record. The figure below is one of `symgen cestac` with `place: loop`, the phase of the encoders
+random from run to run (`python benchmarks/cestac_estimators.py`). Dashed: recorded positions alone rounded, `place: record`. DIDIM does not see them
+at all, which says nothing about an encoder in the loop.
 
 ![bias and scatter](estimators.png)
 
@@ -382,7 +339,6 @@ def main() -> None:
     print(page)
     (given.output / "estimators_simulated.md").write_text(page)
     bias_figure(rows, kept).savefig(given.output / "estimators.png", dpi=110)
-    error_figure(rows, kept).savefig(given.output / "cestac_estimators.png", dpi=110)
 
 
 if __name__ == "__main__":

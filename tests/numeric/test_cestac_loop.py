@@ -1,0 +1,141 @@
+"""CESTAC with every estimator, on recorded positions and with the encoder inside the loop of the planar arm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from campaign import campaign
+from test_closed_loop import ARM, arm, away  # noqa: F401  (arm is a fixture)
+
+from runtime.errors import InputError, SettingsError
+from runtime.estimators.closed_loop import closed_loop
+from runtime.estimators.methods import estimate_of
+from runtime.motion.simulation import Simulator
+from runtime.observation.observation import observe
+from runtime.resolution.cestac import cestac
+from runtime.resolution.loop import loop_of
+from runtime.resolution.rounding import rounded, stream
+from runtime.resolution.runs import Level
+from runtime.settings.study import CestacSettings, EstimateSettings, study_from_mapping
+
+STEP = 2e-4
+TORQUE = {"saturation": None, "noise": 0.05}
+
+
+@pytest.fixture(scope="module")
+def study():
+    settings = {"columns": "all", "rounding": "phase", "delta": [STEP], "runs": 2}
+    return study_from_mapping({**ARM, "cestac": settings, "controller": {**ARM["controller"], "torque": TORQUE}})
+
+
+@pytest.fixture(scope="module")
+def simulator(arm, study):  # noqa: F811
+    return Simulator(arm[0], study.controller)
+
+
+@pytest.fixture(scope="module")
+def record(arm, simulator):  # noqa: F811
+    *_, truth, reference = arm
+    return simulator.run(truth, reference, seed=5).record()
+
+
+def method(study, name, **options):
+    return replace(study, estimate=EstimateSettings(name, options=options))
+
+
+def in_loop(study, **changed):
+    return replace(study, cestac=replace(study.cestac, place="loop", **changed))
+
+
+def test_robust_least_squares_on_rounded_positions(arm, study, record):  # noqa: F811
+    """A run is the identification of the record with the positions of that draw."""
+    robust = replace(method(study, "irls"), rows=replace(study.rows, low_speed=0.0))  # else the rows of a run are those of the measured speeds
+    found = cestac(arm[0], record, robust)
+    q = rounded(record.q, STEP, "phase", stream(1, 0, 1))
+    by_hand = estimate_of(observe(arm[0], replace(record, q=q), robust), robust.estimate)
+    assert np.allclose(found.levels[0].runs[1].X, by_hand.X, rtol=1e-9)
+    assert found.reference.method == "irls" and found.notes == ()
+
+
+def test_instruments_on_rounded_positions(arm, study, record, simulator):  # noqa: F811
+    model, *_, truth, _ = arm
+    start = away(truth, model.BASE_PARAMETERS)
+    instruments = method(study, "iv", start=start, gains="one")
+    found = cestac(model, record, instruments, simulator=simulator)
+    q = rounded(record.q, STEP, "phase", stream(1, 0, 0))
+    selected = closed_loop(model, [record], instruments, simulator).measured()
+    by_hand = closed_loop(model, [replace(record, q=q)], instruments, simulator).measured()
+    assert np.allclose(found.levels[0].runs[0].X, estimate_of(by_hand, instruments.estimate, model=model).X, rtol=1e-6)
+    assert np.allclose(found.reference.X, estimate_of(selected, instruments.estimate, model=model).X, rtol=1e-9)
+    i = found.names.index("ZZ1R")
+    assert found.levels[0].e[i] < cestac(model, record, study).levels[0].e[i] / 2
+    assert "place: loop" in found.notes[0]
+
+
+def test_didim_does_not_see_recorded_positions_and_says_so(arm, study, record, simulator):  # noqa: F811
+    model, *_, truth, _ = arm
+    found = cestac(model, record, method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one"), simulator=simulator)
+    i = found.names.index("ZZ1R")
+    assert found.levels[0].e[i] < 0.1 < cestac(model, record, study).levels[0].e[i]
+    assert "reads of the recorded positions the first alone" in found.notes[0]
+    assert found.estimator == "DIDIM" and "DIDIM" in found.mean_table().to_text()
+
+
+def test_the_encoder_in_the_loop_has_a_random_phase(arm, study, simulator):  # noqa: F811
+    """Positions of a run lie on phi + k Delta; the arm answers them; the run is least squares of that record."""
+    model, *_ = arm
+    asked = in_loop(study)
+    loop = loop_of(model, (), asked, simulator)
+    fine, coarse = (loop.simulated(Level(step), (0, 0)).parts[0].record for step in (1e-7, STEP))
+    phases = (coarse.q / STEP) % 1
+    assert np.allclose(phases, phases[0], atol=1e-6) and abs(phases[0, 0] - phases[0, 1]) > 0.01
+    assert np.abs(coarse.tau - fine.tau).max() > 1  # N m: 400 N m/rad and differences over 0.25 ms
+    found = cestac(model, (), asked, simulator=simulator)
+    rows = loop.simulated(Level(STEP), (1, 1)).measured()
+    X, *_ = np.linalg.lstsq(rows.W, rows.Y, rcond=None)
+    assert len(found.levels) == 1 and np.allclose(found.levels[0].runs[1].X, X, rtol=1e-7)
+    exact = [loop.simulated(Level(0.0), (0, run)).measured() for run in range(2)]
+    mean = np.mean([np.linalg.lstsq(o.W, o.Y, rcond=None)[0] for o in exact], axis=0)
+    assert np.allclose(found.reference.X, mean, rtol=1e-7)
+    assert found.settings["controller"]["rate"] == 4000
+
+
+@campaign
+def test_didim_sees_the_encoder_in_the_loop(arm, study, simulator):  # noqa: F811
+    model, *_, truth, _ = arm
+    asked = in_loop(method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one", around=0.05))
+    found = cestac(model, (), asked, simulator=simulator)
+    assert found.levels[0].e[found.names.index("ZZ1R")] > 0.2
+
+
+def test_total_least_squares_is_told_the_steps(arm, study, record):  # noqa: F811
+    """On rounded positions it is nearer to the estimate of the record than least squares."""
+    least, total = (cestac(arm[0], record, method(study, name)) for name in ("ols", "tls"))
+    i = least.names.index("ZZ2")
+    assert np.allclose(least.reference.X, total.reference.X)
+    assert total.levels[0].e[i] < least.levels[0].e[i]
+
+
+@campaign
+def test_other_processes_simulate_the_same_loop(arm, study, simulator):  # noqa: F811
+    one, two = (cestac(arm[0], (), in_loop(study), simulator=simulator, workers=workers) for workers in (0, 2))
+    assert np.allclose([run.X for run in one.levels[0].runs], [run.X for run in two.levels[0].runs], rtol=1e-9)
+
+
+def test_what_cannot_be_asked(arm, study, record):  # noqa: F811
+    for changed, words in (
+        ({"uneven": 0.1}, "uneven lines belong to rounding: phase"),
+        ({"rounding": "phase", "common": True}, "set common: false"),
+        ({"place": "loop"}, "rounds by the law phase alone"),
+        ({"place": "loop", "rounding": "phase", "uneven": 0.1}, "has even lines"),
+        ({"place": "loop", "rounding": "phase", "torque": [0.1]}, "controller.torque.step"),
+    ):
+        with pytest.raises(SettingsError, match=words):
+            CestacSettings(**changed)
+    with pytest.raises(SettingsError, match="didim simulates the closed loop, and this study tells none"):
+        cestac(arm[0], record, replace(method(study, "didim"), controller=None))
+    with pytest.raises(SettingsError, match="place: loop simulates the closed loop"):
+        cestac(arm[0], (), replace(in_loop(study), controller=None))
+    once = method(study, "iv", passes=1, start=away(arm[3], arm[0].BASE_PARAMETERS), gains="one")
+    with pytest.raises(InputError, match="iv: no estimate of the record as measured to compare with"):
+        cestac(arm[0], record, once)
