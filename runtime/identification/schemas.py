@@ -162,6 +162,8 @@ class CestacDocument:
         Settings of the study, complete.
     provenance : mapping
         Hashes, versions, records.
+    notes : tuple of str
+        What the figures do not say.
     """
 
     names: tuple[str, ...]
@@ -172,6 +174,7 @@ class CestacDocument:
     levels: tuple[LevelDocument, ...]
     settings: dict[str, Any]
     provenance: dict[str, Any]
+    notes: tuple[str, ...] = ()
 
 
 def schemas() -> dict[str, str]:
