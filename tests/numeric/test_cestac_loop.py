@@ -49,7 +49,9 @@ def in_loop(study, **changed):
 
 def test_robust_least_squares_on_rounded_positions(arm, study, record):  # noqa: F811
     """A run is the identification of the record with the positions of that draw."""
-    robust = replace(method(study, "irls"), rows=replace(study.rows, low_speed=0.0))  # else the rows of a run are those of the measured speeds
+    robust = replace(
+        method(study, "irls"), rows=replace(study.rows, low_speed=0.0)
+    )  # else the rows of a run are those of the measured speeds
     found = cestac(arm[0], record, robust)
     q = rounded(record.q, STEP, "phase", stream(1, 0, 1))
     by_hand = estimate_of(observe(arm[0], replace(record, q=q), robust), robust.estimate)
