@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import lru_cache
-from itertools import combinations, product
 from math import gcd, lcm
 
 import numpy as np
@@ -23,6 +22,8 @@ PI: Monomial = (("pi", 1),)
 LARGEST_RADICAND = 100  # roots of larger primes are drawn by themselves: their fields share nothing with angles of small denominator
 LARGEST_DENOMINATOR, LARGEST_ORDER = 360, 100_000  # of a fraction of pi, and of all of them together
 LARGEST_MULTIPLE = 16  # of a unit angle
+SMALL = [k for n in range(1, LARGEST_MULTIPLE + 1) for k in (n, -n)]
+FEW = 4  # of each of two unit angles in a sum
 Unit = tuple[Monomial, Fraction]  # the angle fraction * monomial
 Variable = str | Number | Call | Unit  # what a geometry may give: a constant, "pi", a number, a square root, a unit angle
 
@@ -48,7 +49,9 @@ class Units:
         for l in radicands(robot):
             self.D = lcm(self.D, 4 if l == 2 else l if l < LARGEST_RADICAND else 1)
         self.free: dict[Monomial, list[Fraction]] = {}
+        self.multiples: dict[Monomial, dict[Fraction, tuple[Fraction, int]]] = {}  # {multiple of a free unit, without turns: (unit, k)}
         self.sums: dict[tuple[Monomial, Fraction], list[tuple[Unit, int]]] = {}
+        self.written: dict[tuple[Monomial, Fraction], list[tuple[Unit, int]]] = {}  # amounts found once
         angles = fixed_angles(robot)
         for c in sorted({e.terms.get(PI, Fraction(0)) for e in angles}, key=lambda c: c.denominator):
             if c.denominator <= LARGEST_DENOMINATOR and lcm(self.D, c.denominator) <= LARGEST_ORDER:
@@ -62,7 +65,7 @@ class Units:
             common = lcm(*(c.denominator for c in found))
             unit = Fraction(gcd(*(int(c * common) for c in found)), common)
             if max(found) / unit <= LARGEST_MULTIPLE:
-                self.free[m] = [unit]
+                self._new(m, unit)
         for e in angles:
             self.of(e)
         self._add_sums(robot)
@@ -100,20 +103,39 @@ class Units:
             return turns
         if (m, c) in self.sums:
             return self.sums[m, c]
-        free = self.free.setdefault(m, [])
-        small = [k for n in range(1, LARGEST_MULTIPLE + 1) for k in (n, -n)]
-        for unit, k in product(free, small):
-            rest = (c - k * unit) * self.D
-            if rest == 0:
-                return [((m, unit), k)]
-            if m == PI and rest.denominator == 1:
-                return [((m, unit), k), ((PI, Fraction(1, self.D)), int(rest))]
-        for (u, v), k, n in product(combinations(free, 2), small[:8], small[:8]):
-            rest = (c - k * u - n * v) * self.D
-            if rest == 0 or (m == PI and rest.denominator == 1):
-                return [((m, u), k), ((m, v), n), *([((PI, Fraction(1, self.D)), int(rest))] if rest else [])]
-        free.append(abs(c))
-        return [((m, abs(c)), 1 if c > 0 else -1)]
+        if (m, c) not in self.written:
+            found = self._in_known(m, c)
+            if found is None:
+                self._new(m, abs(c))
+                found = [((m, abs(c)), 1 if c > 0 else -1)]
+            self.written[m, c] = found
+        return self.written[m, c]
+
+    def _in_known(self, m: Monomial, c: Fraction) -> list[tuple[Unit, int]] | None:
+        """c as a multiple of one free unit or of two, and of pi/D, if it is one."""
+        known = self.multiples.get(m, {})
+        if (hit := known.get(self._part(m, c))) is not None:
+            return self._with_turns(m, c, [hit])
+        for u in self.free.get(m, ()):
+            for k in SMALL[: 2 * FEW]:
+                hit = known.get(self._part(m, c - k * u))
+                if hit is not None and abs(hit[1]) <= FEW:
+                    return self._with_turns(m, c, [(u, k), hit])
+        return None
+
+    def _part(self, m: Monomial, c: Fraction) -> Fraction:
+        """What is left of an amount without the multiples of pi/D."""
+        return c % Fraction(1, self.D) if m == PI else c
+
+    def _with_turns(self, m: Monomial, c: Fraction, parts: list[tuple[Fraction, int]]) -> list[tuple[Unit, int]]:
+        rest = (c - sum(k * u for u, k in parts)) * self.D
+        return [((m, u), k) for u, k in parts] + ([((PI, Fraction(1, self.D)), int(rest))] if rest else [])
+
+    def _new(self, m: Monomial, unit: Fraction) -> None:
+        self.free.setdefault(m, []).append(unit)
+        known = self.multiples.setdefault(m, {})
+        for k in SMALL:
+            known.setdefault(self._part(m, k * unit), (unit, k))
 
 
 @lru_cache(maxsize=64)

@@ -17,6 +17,8 @@ def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
         return _form(motion, e.kind, e.form[j])
     row = e.along[j]
     x = _along(motion, e, j)
+    if type(x) is int and x == 0:
+        return dict.fromkeys(row, 0)
     return {i: mul(motion.algebra.constant(g), x) for i, g in row.items()}
 
 
@@ -37,7 +39,8 @@ def _along(motion: Motion, e: Element, j: int) -> Scalar:
     row = e.along[j]
     rate: Scalar = 0
     for i, g in row.items():
-        rate = add(rate, mul(motion.algebra.constant(g), _coordinate(motion, e.kind, i)))
+        x = _coordinate(motion, e.kind, i)
+        rate = rate if type(x) is int and x == 0 else add(rate, mul(motion.algebra.constant(g), x))
     if e.kind in ("viscous", "coulomb"):
         if len(row) > 1:
             rate = motion.algebra.name(rate, f"{motion.named('QP')}{parameter(e.family, j)}")

@@ -94,8 +94,14 @@ def _floats(function: Any, *arguments: Array) -> Array:
     columns = [np.broadcast_to(a, (*shape, np.shape(a)[-1])).reshape(-1, np.shape(a)[-1]).T for a in arguments]
     N = columns[0].shape[1]
     rows, width = function.size_out(0)
-    out = np.asarray(function.map(N)(*columns).full())  # (rows, width*N)
-    return out.reshape(rows, N, width).transpose(1, 0, 2).reshape(*shape, rows, width)
+    out = np.zeros((N, width, rows))  # column-major, as CasADi writes it
+    buffer, evaluate = function.map(N).buffer()
+    given = [np.ascontiguousarray(c.T, dtype=float) for c in columns]
+    for k, c in enumerate(given):
+        buffer.set_arg(k, c.data)
+    buffer.set_res(0, out.data)
+    evaluate()
+    return np.ascontiguousarray(out.transpose(0, 2, 1)).reshape(*shape, rows, width)
 
 
 def _matrices(columns: Array) -> Array:
@@ -157,14 +163,7 @@ class Lagrange:
 
     def _element(self, e: Element, j: int, q: Array, qd: Array, qdd: Array) -> Array:
         """Gamma of an element's key j for parameter 1, (..., n)."""
-        index = {i: k for k, i in enumerate(self.robot.moving)}
-        G, B = np.zeros(len(index)), np.zeros((len(index), len(index)))
-        for i, x in e.along.get(j, {}).items():
-            G[index[i]] = x.value(self.constants)
-        for (i, l), x in e.form.get(j, {}).items():
-            B[index[i], index[l]] = x.value(self.constants)
-        if j in e.along:
-            B = np.outer(G, G)
+        G, B = self._row(e, j), self._form(e, j)
         if e.kind in ("inertia", "stiffness"):
             return np.asarray({"inertia": qdd, "stiffness": q}[e.kind] @ B)
         if e.kind == "offset":
@@ -172,6 +171,21 @@ class Lagrange:
         sd = np.asarray(qd @ G)[..., None]
         force = np.asarray(qd @ B if e.kind == "viscous" else np.sign(sd) * G)
         return force if e.when is None else force * (sd > 0 if e.when == "positive" else sd < 0)
+
+    def _row(self, e: Element, j: int) -> Array:
+        """G of an element's key j, (n,)."""
+        G = np.zeros(len(self.robot.moving))
+        for i, x in e.along.get(j, {}).items():
+            G[self.robot.moving.index(i)] = x.value(self.constants)
+        return G
+
+    def _form(self, e: Element, j: int) -> Array:
+        """B of an element's key j, (n, n); G'G along a row."""
+        G, moving = self._row(e, j), self.robot.moving
+        B = np.outer(G, G)
+        for (i, l), x in e.form.get(j, {}).items():
+            B[moving.index(i), moving.index(l)] = x.value(self.constants)
+        return B
 
     def torque(self, q: Array, qd: Array, qdd: Array, chi: Array) -> Array:
         """Gamma, (..., n)."""
@@ -182,10 +196,17 @@ class Lagrange:
         return self.torque(q, 0 * q, 0 * q, chi)
 
     def inertia_matrix(self, q: Array, chi: Array) -> Array:
-        """A = d2E/dqd2, (..., n, n): column i is Gamma for a unit acceleration of joint i, less Gamma at rest."""
-        rest = self.gravity(q, chi)
-        columns = [self.torque(q, 0 * q, np.broadcast_to(e, np.shape(q)), chi) - rest for e in np.eye(np.shape(q)[-1])]
-        return np.stack(columns, axis=-1)
+        """A = d2E/dqd2, (..., n, n): sum_j trace(d0Tj/dq_i Sigma_j d0Tj'/dq_l), and the inertias along rows of elements."""
+        slope, robot, n = self.slopes(q), self.robot, np.shape(q)[-1]
+        value = {name: np.asarray(chi)[..., k] for k, name in enumerate(self.names)}
+        A = np.zeros((*np.shape(q), n))
+        for j in robot.links:
+            Sigma = sum(value[parameter(name, j)][..., None, None] * unit for name, unit in zip(INERTIAL, LINK, strict=True))
+            A += np.einsum("...iab,...bc,...lac->...il", slope[..., j - 1, :, :], Sigma, slope[..., j - 1, :, :])
+        for e in robot.elements:
+            for j in e.keys if e.kind == "inertia" else ():
+                A += value[parameter(e.family, j)][..., None, None] * self._form(e, j)
+        return A
 
     def jacobian(self, q: Array, frame: int | None = None) -> Array:
         """Velocity of the origin, then angular velocity w from hat(w) = Rdot R', of `frame` (default: the last) in frame 0 per qd, (..., 6, n)."""
@@ -224,6 +245,11 @@ class Lagrange:
         """G' D_tree at actuated q, qd, qdd (..., n_a), order `robot.joints`: (..., n_a, p)."""
         *state, G = self.motion(q, qd, qdd)
         return np.swapaxes(G, -1, -2) @ self.regressor(*state)
+
+    def actuated_inertia(self, q: Array, chi: Array) -> Array:
+        """G' A G at actuated q (..., n_a): (..., n_a, n_a)."""
+        x, _, _, G = self.motion(q, 0 * q, 0 * q)
+        return np.asarray(np.swapaxes(G, -1, -2) @ self.inertia_matrix(x, chi) @ G)
 
 
 def _closure(robot: Robot, T: Mapping[int, SX], q: SX, constants: Mapping[str, float]) -> SX:

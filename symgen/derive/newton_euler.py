@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 from symgen.derive.geometry import Geometry
 from symgen.derive.names import Names
-from symgen.derive.scalar import ZERO3, Matrix, Scalar, Vector, add, apply, cross, dot, mul, scale, sub, vadd
+from symgen.derive.scalar import ZERO3, Matrix, Scalar, Vector, add, apply, cross, dot, is_zero, mul, scale, sub, vadd
 from symgen.description.expression import Expression
-from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, parameter
+from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, parameter
 
 ZERO33: Matrix = (ZERO3, ZERO3, ZERO3)
 TWO = Expression.number(2)
@@ -53,6 +53,9 @@ class LinkMotion:
     a: Vector
 
 
+REST = LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, ZERO3)
+
+
 class Motion:
     """Outward recursion: q, qd, qdd of the actuated joints move the whole tree.
 
@@ -78,7 +81,7 @@ class Motion:
         self._qd = {i: self.algebra.qd(i) if velocity and unit is None else 0 for i in closure.independent}
         self._qdd = {i: self._acceleration(i, acceleration, velocity, unit) for i in closure.independent}
         g = tuple(self.algebra.constant(-e) for e in self.robot.gravity) if self.gravity else ZERO3
-        self.link: dict[int, LinkMotion] = {0: LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, g)}
+        self.link: dict[int, LinkMotion] = {0: REST if is_zero(g) else LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, g)}
         for f in self.robot.frames:
             self.link[f.j] = self._link(f.j)
 
@@ -121,6 +124,9 @@ class Motion:
         for k, multiple in carrier.turn:
             n = self.algebra.constant(Expression.number(multiple))
             rate, acceleration = add(rate, mul(n, self._qd[k])), add(acceleration, mul(n, self._qdd[k]))
+        slides = (self.qd(j), self.qdd(j)) if f.sigma == PRISMATIC else (0, 0)
+        if inner is REST and i is REST and is_zero((rate, acceleration, 0)) and is_zero((*slides, 0)):
+            return REST
         w0, wd0 = geometry.from_carrier(j, inner.w), geometry.from_carrier(j, inner.wd)
         w = self.vector("W", (w0[0], w0[1], add(w0[2], rate)), j)
         wd = self.vector("WP", (add(wd0[0], mul(w[1], rate)), sub(wd0[1], mul(w[0], rate)), add(wd0[2], acceleration)), j)
@@ -129,8 +135,8 @@ class Motion:
         VSP = self.vector("VSP", vadd(i.a, apply(i.U, P)), j)
         a = geometry.rotation[j].down(VSP)
         if f.sigma == PRISMATIC:
-            qd2 = mul(self.algebra.constant(TWO), self.qd(j))
-            a = (add(a[0], mul(qd2, w[1])), sub(a[1], mul(qd2, w[0])), add(a[2], self.qdd(j)))
+            qd2 = mul(self.algebra.constant(TWO), slides[0])
+            a = (add(a[0], mul(qd2, w[1])), sub(a[1], mul(qd2, w[0])), add(a[2], slides[1]))
         return LinkMotion(w, wd, DV, DW, U, self.vector("VP", a, j))
 
     def _products(self, w: Vector, wd: Vector, j: int) -> tuple[Matrix, Vector, Matrix]:
@@ -181,6 +187,9 @@ def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
     torque: dict[int, Scalar] = {}
     for frame in reversed(robot.frames):
         j, i = frame.j, frame.ant
+        if motion.link[j] is REST and is_zero(f[j]) and is_zero(n[j]):
+            torque |= {j: 0} if frame.sigma != FIXED else {}
+            continue
         motion.algebra.section(f"Joint {j}")
         link = {p: K.get(parameter(p, j), 0) for p in INERTIAL}
         f[j] = vector("E", vadd(vector("F", force(motion.link[j], link), j), f[j]), j)

@@ -10,29 +10,37 @@ import numpy as np
 from symgen.derive.exact import Array, power
 
 
-def rref(M: Array, p: int) -> tuple[list[int], Array]:
-    """Pivot columns (leftmost first) and the reduced rows, shape (rank, columns), of M over F_p."""
-    M = M % p
+def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
+    """Pivot columns (leftmost first) and the reduced rows, shape (rank, columns), of M over F_p.
+
+    The row with the fewest entries at the start is taken first and touches its own columns alone, which is quick where the branches of a tree
+    share few columns. Without `reduced` the rows of earlier pivots stay as they are: the rank alone.
+    """
+    M = M[np.argsort(np.count_nonzero(M, axis=1), kind="stable")] % p
+    left = np.ones(len(M), dtype=bool)
     pivots: list[int] = []
-    rank, (rows, columns) = 0, M.shape
-    for c in range(columns):
-        below = np.flatnonzero(M[rank:, c])
-        if below.size == 0:
+    order: list[int] = []
+    for c in range(M.shape[1]):
+        column = M[:, c]
+        rows = np.flatnonzero(column) if reduced else np.flatnonzero(left & (column != 0))
+        free = rows[left[rows]]
+        if free.size == 0:
             continue
-        r = rank + int(below[0])
-        if r != rank:
-            M[[rank, r]] = M[[r, rank]]
-        M[rank, c:] = M[rank, c:] * pow(int(M[rank, c]), -1, p) % p
-        factor = M[:, c].copy()
-        factor[rank] = 0
-        touched = np.flatnonzero(factor)
-        if touched.size:
-            M[touched, c:] = (M[touched, c:] - factor[touched, None] * M[rank, c:] % p) % p
+        r = int(free[0])
+        left[r] = False
         pivots.append(c)
-        rank += 1
-        if rank == rows:
+        order.append(r)
+        entries = c + np.flatnonzero(M[r, c:])
+        pivot = M[r, entries] * pow(int(M[r, c]), -1, p) % p
+        M[r, entries] = pivot
+        touched = rows[rows != r]
+        if 2 * entries.size > M.shape[1] - c:
+            pivot, entries = M[r, c:], np.arange(c, M.shape[1])
+        place = np.ix_(touched, entries) if entries.size < M.shape[1] - c else np.s_[touched, c:]
+        M[place] = (M[place] + (p - M[touched, c])[:, None] * pivot) % p
+        if len(order) == len(M):
             break
-    return pivots, M[:rank]
+    return pivots, M[order]
 
 
 def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:

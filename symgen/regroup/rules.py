@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from symgen.derive.scalar import apply
 from symgen.description.expression import ONE, ZERO, Expression, call
-from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, parameter
+from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, parameter
 
 TENSOR = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
 FIRST = ("MX", "MY", "MZ")
@@ -38,9 +38,13 @@ class Transfer:
         self.robot = robot
         self.combination: dict[str, Combination] = {name: {name: ONE} for name in robot.parameters}
         self.steps: list[Step] = []
-        for frame in reversed(robot.frames):
-            if frame.j in robot.links and (frame.ant == 0 or frame.ant in robot.links):
-                self._link(frame)
+        self.rigid: set[int] = set()  # frames fixed to a link, or to the base, that are none themselves: what reaches them goes on
+        for f in robot.frames:
+            if f.sigma == FIXED and f.j not in robot.links and (f.ant == 0 or f.ant in robot.links or f.ant in self.rigid):
+                self.rigid.add(f.j)
+        for f in reversed(robot.frames):
+            if f.j in robot.links and (f.ant == 0 or f.ant in robot.links or f.ant in self.rigid):
+                self._link(f)
 
     @property
     def kept(self) -> tuple[str, ...]:
@@ -48,10 +52,23 @@ class Transfer:
 
     def _link(self, frame: Frame) -> None:
         for name, image in link_relations(frame).items():
-            self._move(
-                parameter(name, frame.j),
-                {(parameter(k, frame.ant if at else frame.j)): c for (k, at), c in image.items() if at == 0 or frame.ant},
-            )
+            into: Combination = {}
+            for (k, at), c in image.items():
+                for target, share in self._reached(k, frame.ant).items() if at else [(parameter(k, frame.j), ONE)]:
+                    into[target] = into.get(target, ZERO) + c * share
+            self._move(parameter(name, frame.j), {target: c for target, c in into.items() if c})
+
+    def _reached(self, name: str, j: int) -> Combination:
+        """The columns of links that the column of a parameter of frame j is."""
+        if j == 0:
+            return {}
+        if j not in self.rigid:
+            return {parameter(name, j): ONE}
+        total: Combination = {}
+        for (k, _), c in link_relations(self.robot.frame(j))[name].items():
+            for target, share in self._reached(k, self.robot.frame(j).ant).items():
+                total[target] = total.get(target, ZERO) + c * share
+        return total
 
     def _move(self, source: str, image: Combination) -> None:
         """Remove the column `source` = sum_k image_k column k."""

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
-from functools import partial
+from functools import lru_cache, partial
 from itertools import combinations, combinations_with_replacement, product
-from math import isqrt
+from math import comb, isqrt
 from typing import Protocol
 
 import numpy as np
@@ -61,10 +61,18 @@ def states_for(robot: Robot, names: Sequence[str]) -> int:
 
     The columns that act on the joints of a set S alone need |columns| <= states |S| rows: counted for the set of every column, and for all joints.
     """
-    acts = (sample(Draw(robot, 5, 2), tuple(names)) != 0).reshape(len(robot.joints), 2, len(names)).any(axis=1).T
+    known = _acting(robot)
+    acts = np.stack([known[name] for name in names])
     sets = np.unique(np.vstack([acts[acts.any(axis=1)], np.ones((1, len(robot.joints)), dtype=bool)]), axis=0)
     needed = max(np.count_nonzero((acts <= S).all(axis=1)) / np.count_nonzero(S) for S in sets)
     return int(np.ceil(needed + 10 / len(robot.joints))) + 4
+
+
+@lru_cache(maxsize=8)
+def _acting(robot: Robot) -> dict[str, Array]:
+    """{column: whether it acts on each joint} of all standard parameters, at random states."""
+    W = sample(Draw(robot, 5, 2), robot.parameters).reshape(len(robot.joints), 2, -1)
+    return dict(zip(robot.parameters, (W != 0).any(axis=1).T, strict=True))
 
 
 def coefficients(robot: Robot, supports: Supports) -> tuple[dict[str, list[Expression]], dict[str, str]]:
@@ -231,6 +239,8 @@ class Recognition:
 
     def _recognise(self, name: str, k: int, matters: Sequence[Variable]) -> Expression | None:
         for (numerator, denominator), angles in product(DEGREES, self._choices(matters)):
+            if comb(len(matters) - sum(isinstance(v, tuple) for v in matters) + len(angles) + numerator, numerator) > MAX_UNKNOWNS:
+                continue  # more products without a sine than may be looked for
             P, Q = self._monomials(matters, angles, numerator), self._monomials(matters, angles, denominator)
             if len(P) + len(Q) + 4 > MAX_UNKNOWNS or (numerator and len(P) == 1):
                 continue
@@ -277,20 +287,20 @@ class Recognition:
         return None
 
     def _choices(self, matters: Sequence[Variable]) -> list[tuple[Expression, ...]]:
-        """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all."""
+        """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all; they hold every unit that matters."""
         units, known = {v for v in matters if isinstance(v, tuple)}, units_of(self.robot)
-        angles = [e for e in fixed_angles(self.robot) if units & {unit for unit, _ in known.of(e)}]
-        choices = [tuple(c) for n in (1, 2) for c in combinations(angles, n)]
+        held = {e: units & {unit for unit, _ in known.of(e)} for e in fixed_angles(self.robot)}
+        angles = [e for e in held if held[e]]
+        choices = [c for n in (1, 2) for c in combinations(angles, n) if set().union(*(held[e] for e in c)) == units]
         return [*choices, *([tuple(angles)] if len(angles) > 2 else [])] if angles else [()]
 
     def _monomials(self, matters: Sequence[Variable], angles: Sequence[Expression], degree: int) -> Products:
         """Products of at most `degree` constants, cosines and sines; sin to the first power only, as sin**2 = 1 - cos**2."""
         sines = [_atom(Call("sin", e)) for e in angles]
         atoms = [_atom(v) for v in matters if not isinstance(v, tuple)] + [_atom(Call("cos", e)) for e in angles] + sines
-        products: list[tuple[Expression, ...]] = []
-        for d in range(degree + 1):
-            products += [m for m in combinations_with_replacement(atoms, d) if all(m.count(s) < 2 for s in sines)]
-        return products
+        once = range(len(atoms) - len(sines), len(atoms))
+        places = [m for d in range(degree + 1) for m in combinations_with_replacement(range(len(atoms)), d)]
+        return [tuple(atoms[k] for k in m) for m in places if all(m.count(s) < 2 for s in once)]
 
 
 def _fraction(entries: Mapping[int, Fraction], P: Products, Q: Products) -> Expression | None:

@@ -13,6 +13,7 @@ from campaign import FULL, campaign
 
 from oracles.numeric_robots import describe_numbers, numeric_robot
 from symgen import Robot, SymgenError, certify, load_robot, parse_robot, regrouping
+from symgen.derive.angles import units_of
 from symgen.description.at_values import at_values, exact
 from symgen.description.expression import Expression, Number, call
 from symgen.emit.certified import certified_files
@@ -99,6 +100,15 @@ ROBOTS = {
     ),
     "nested roots": arm("0 0 q1 0", "pi/8 sqrt(2+sqrt(2))/2 q2 0", "pi/8 sqrt(2+sqrt(2))/2 q3 0", "pi/4 0.1 q4 0"),
     "twenty-nine digits": arm("0 0 q1 0", "0 0.12345678901234567890123456789 q2 0", "0 0.98765432109876543210987654321 q3 0"),
+    "frames without mass between links, at decimal angles": arm(
+        "0 0 q1 0",
+        "1.2345678 0.3 q2 0",
+        "{ant: 2, sigma: 2, alpha: 0.9876543, d: 0.1, theta: 0.3456789, r: 0.05}",
+        "{ant: 3, sigma: 2, alpha: pi/2, d: 0, theta: 0, r: 0.07}",
+        "{ant: 4, sigma: 0, alpha: 0.7654321, d: 0.2, theta: q5, r: 0}",
+        "{ant: 3, sigma: 1, alpha: 0.5432101, d: 0.2, theta: 0, r: q6}",
+        rest="massless: [3, 4]\n",
+    ),
     "lengths that add up": arm("0 0 q1 0", "pi/2 0.3 q2 0", "0 0.2 q3 0", "0 0.5 q4 0", "pi/2 -0.5 q5 0"),
 }
 
@@ -108,6 +118,18 @@ def test_certified_with_its_emitted_module(what: str) -> None:
     certificate = certify(regrouping(ROBOTS[what]))
     assert certificate.valid, certificate
     assert certificate.primes and max(certificate.module_errors.values()) < 1e-10
+
+
+def test_many_decimal_angles_are_read_quickly() -> None:
+    rng = np.random.default_rng(8)
+    rows = [f"{rng.uniform(-3, 3):.12f}+{rng.uniform(-3, 3):.11f}*pi 0.1 q{j} 0" for j in range(1, 41)]
+    robot = arm("0 0 q1 0", *(row.replace(f"q{j}", f"q{j + 1}") for j, row in enumerate(rows, start=1)))
+    start = time.process_time()
+    units = units_of(robot)
+    assert time.process_time() - start < 2
+    for f in robot.frames[1:]:
+        parts = units.of(f.alpha)
+        assert float(sum(k * c * (np.pi if m else 1) for (m, c), k in parts)) == pytest.approx(f.alpha.value({}))
 
 
 def formulas(robot: Robot) -> dict[str, str]:
