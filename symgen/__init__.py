@@ -3,6 +3,7 @@
     model = symgen.model("arm.urdf")                  # the module: derived, emitted, certified, imported
     base = symgen.regrouping(symgen.load_robot("tx40"))   # base parameters, each with its formula
     symgen.certify(base).valid                        # exact rank and identities, independent dynamics, emitted module
+    symgen.apply("results", "arm.urdf").write("new.urdf")  # identified values into the user's own URDF or MJCF
 
 Names are loaded when they are first used.
 """
@@ -19,13 +20,17 @@ if TYPE_CHECKING:
     from symgen.regroup.certificate import Certificate
     from symgen.regroup.regrouping import BaseParameter, Regrouping
     from symgen.regroup.regrouping import regroup as regrouping
+    from symgen.update.applied import Applied
+    from symgen.update.apply import apply
 
 __all__ = [
+    "Applied",
     "BaseParameter",
     "Certificate",
     "Regrouping",
     "Robot",
     "SymgenError",
+    "apply",
     "certify",
     "generate_module",
     "load_robot",
@@ -41,6 +46,8 @@ _HOME = {
     **dict.fromkeys(("certify", "model"), "symgen.emit.certified"),
     "Certificate": "symgen.regroup.certificate",
     "generate_module": "symgen.emit.generate",
+    "Applied": "symgen.update.applied",
+    "apply": "symgen.update.apply",
 }
 
 

@@ -116,7 +116,7 @@ def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, st
     scale = scales(physical)
     space, rows = solutions(physical.rows(names), X, scale), limit_rows(physical, limits)
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
-    least = float(np.clip(min(physical.smallest(start).values()) / 2, 0.0, LEAST))
+    least = float(np.clip(min(physical.smallest(start).values()) / 2, LEAST**2, LEAST))  # not zero, which means another problem
     nearest = closest(np.diag(1 / scale), chi0 / scale, physical.conditions, rows, space, least=least)
     kept = nearest.solved and min(physical.smallest(nearest.chi).values()) >= 0
     return nearest.chi if kept else start

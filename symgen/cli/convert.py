@@ -43,7 +43,7 @@ def convert(
     OUT is written whole or not at all; where the target would hold another mechanism nothing is written, exit code 2.
     """
     with reported_errors():
-        from symgen.description.files import SNAP, read_robot, write_robot
+        from symgen.description.files import read_robot, write_robot
         from symgen.description.urdf import REMARKS
         from symgen.description.values import assignment, values_of_csv, with_estimate, with_values
 
@@ -52,7 +52,7 @@ def convert(
         robot, read = read_robot(
             source,
             constants=dict(map(assignment, constant or ())),
-            nearly=SNAP if snap == "auto" else _angle(snap),
+            nearly=snap_angle(snap),
             keep_fixed=keep_fixed,
             lock=dict(assignment(text, "--lock") for text in lock or ()),
             chain=chain,
@@ -75,7 +75,12 @@ def convert(
                 typer.echo("\n".join([f"{head}:", *(f"  - {note}" for note in notes)]), err=notes is remarks)
 
 
-def _angle(text: str) -> float:
+def snap_angle(text: str) -> float:
+    """The angle, rad, that --snap means."""
+    from symgen.description.files import SNAP
+
+    if text == "auto":
+        return SNAP
     try:
         angle = float(text)
     except ValueError:

@@ -23,6 +23,7 @@ VERBS = {
     "simulate": "Simulate the closed loop of a study file and write its record.",
     "datasets": "List the measured records this program knows.",
     "convert": "Write a robot in another format: .yaml, .par, .urdf.",
+    "apply": "Write identified values into your own URDF or MJCF, in place.",
     "snippet": "Write a script that uses a robot in pinocchio or Drake.",
     "new": "Write a skeleton robot file.",
     "schema": "Print the JSON Schema of robot files or of results.",

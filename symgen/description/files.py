@@ -87,7 +87,7 @@ def read_robot(
         file = f"{source}.yaml"
         return parse_robot((resources.files("symgen.description") / "robots" / file).read_bytes(), file), ()
     path = Path(source)
-    content = _read(path)
+    content = content_of(path)
     if suffix == ".par":
         return read_par(content, path.name, constants)
     if suffix in TREES:
@@ -131,7 +131,8 @@ def write_robot(robot: Robot, file: str, *, comments: Sequence[str] = ()) -> tup
     return write_par(robot) if suffix == ".par" else (write_yaml(robot, comments=comments), ())
 
 
-def _read(path: Path) -> bytes:
+def content_of(path: Path) -> bytes:
+    """Bytes of a robot file, one more than MAX_BYTES at most; DescriptionError where it cannot be read."""
     known = ", ".join(packaged_robots())
     try:
         if path.exists() and not path.is_file():  # a pipe may never answer, a device never end

@@ -53,11 +53,16 @@ def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False, part: Part
         No MJCF, or no tree of hinges and slides on a resting base; the message names file and line.
     """
     try:
-        mjcf = reduced(content)
-        tree = part_of(_tree(_compiled(mjcf), mjcf, sites=keep_fixed), part)
+        tree = part_of(parse_mjcf(content, sites=keep_fixed), part)
         return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
     except DescriptionError as error:
         raise DescriptionError(error.message, path=error.path, file=file, line=error.line or 1) from error.__cause__
+
+
+def parse_mjcf(content: bytes, *, sites: bool = False) -> Tree:
+    """Links and joints of an MJCF file; `sites`: each is a link on a fixed joint."""
+    mjcf = reduced(content)
+    return _tree(_compiled(mjcf), mjcf, sites=sites)
 
 
 def _compiled(mjcf: Mjcf) -> Any:
@@ -113,6 +118,7 @@ def _tree(model: Any, mjcf: Mjcf, *, sites: bool) -> Tree:
     growing = _Growing(model, mjcf, _joint_names(model))
     for b in range(1, model.nbody):
         _body(growing, b)
+    places = dict(list(growing.place.values())[1:])
     if sites:
         for s in range(model.nsite):
             link, pose = growing.place[int(model.site_bodyid[s])]
@@ -121,7 +127,8 @@ def _tree(model: Any, mjcf: Mjcf, *, sites: bool) -> Tree:
             growing.joints.append(_fixed(name, link, pose @ _pose(model.site_pos[s], model.site_quat[s])))
     gx, gy, gz = (0.0 if mjcf.weightless else float(x) + 0.0 for x in model.opt.gravity)
     notes = (*mjcf.notes, *_left_out(model))
-    return Tree(mjcf.name, growing.links, tuple(growing.joints), "world", _relations(growing), frozenset(growing.bare), (gx, gy, gz), notes)
+    relations, joints = _relations(growing), tuple(growing.joints)
+    return Tree(mjcf.name, growing.links, joints, "world", relations, frozenset(growing.bare), (gx, gy, gz), notes, places)
 
 
 def _named(name: str, what: str, k: int) -> str:

@@ -10,7 +10,7 @@ from symgen.description.expression import Expression
 REVOLUTE, PRISMATIC, FIXED = 0, 1, 2
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 JOINT_FAMILIES = ("Ia", "FV", "FS", "OFFSET")  # the rest of eq. (4), link by link
-USUAL_KINDS = dict(zip(JOINT_FAMILIES, ("inertia", "viscous", "coulomb", "offset"), strict=True))
+USUAL_KINDS = dict(zip((*JOINT_FAMILIES, "K"), ("inertia", "viscous", "coulomb", "offset", "stiffness"), strict=True))
 KINDS = ("inertia", "viscous", "coulomb", "offset", "stiffness")
 DIRECTIONS = ("positive", "negative")
 GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")  # of a row, in the order in which they are applied

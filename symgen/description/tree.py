@@ -103,6 +103,8 @@ class Tree:
         Acceleration of gravity in the root link.
     notes : tuple of str
         What was not read.
+    places : mapping
+        Of MJCF, in the order of its bodies: pose (4, 4) of the frame of each body in the frame of its link. A URDF has one frame for both.
     """
 
     name: str
@@ -113,6 +115,7 @@ class Tree:
     bare: frozenset[str] = frozenset()
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
     notes: tuple[str, ...] = ()
+    places: Mapping[str, Array] = field(default_factory=dict)
 
 
 def turn(axis: int, angle: float) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from symgen.description.checks import is_label
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.robot import FIXED, INERTIAL, Element, Frame, Robot, parameter
-from symgen.description.tree import Joint, Tree
+from symgen.description.tree import Array, Inertial, Joint, Tree
 from symgen.description.tree_frames import Body, Table, placed
 from symgen.errors import DescriptionError
 
@@ -163,12 +163,17 @@ def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozen
 
 def _standard(table: Table, body: Body) -> tuple[float, ...]:
     """XX XY XZ YY YZ ZZ MX MY MZ M of a body in its frame."""
-    M, MS, J = 0.0, np.zeros(3), np.zeros((3, 3))
+    ten = np.zeros(10)
     for name, X in body.links.items():
         inertial = table.tree.links[name]
         if inertial is not None:
-            own = X @ inertial.pose
-            R, c = own[:3, :3], own[:3, 3]
-            M, MS = M + inertial.M, MS + inertial.M * c
-            J = J + R @ inertial.I @ R.T + inertial.M * (c @ c * np.eye(3) - np.outer(c, c))
-    return (*(float(x) for x in J[np.triu_indices(3)]), *(float(x) for x in MS), M)
+            ten += ten_of(inertial, X)
+    return tuple(float(x) for x in ten)
+
+
+def ten_of(inertial: Inertial, X: Array) -> Array:
+    """XX XY XZ YY YZ ZZ MX MY MZ M, shape (10,), of a link with pose X, (4, 4), in the frame of its body."""
+    own = X @ inertial.pose
+    R, c, M = own[:3, :3], own[:3, 3], inertial.M
+    J = R @ inertial.I @ R.T + M * (c @ c * np.eye(3) - np.outer(c, c))
+    return np.array([*J[np.triu_indices(3)], *(M * c), M])

@@ -19,12 +19,13 @@ MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, LARGEST = 5_000_000, 30, 50_000, 1e9
 
 @dataclass
 class Element:
-    """An XML element and the line where it starts."""
+    """An XML element, the line and the byte where it starts."""
 
     tag: str
     attributes: dict[str, str]
     line: int
     children: list[Element] = field(default_factory=list)
+    byte: int = 0
 
     def first(self, tag: str) -> Element | None:
         return next((child for child in self.children if child.tag == tag), None)
@@ -70,7 +71,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> Element:
             raise DescriptionError(f"nested more than {max_depth} deep, or more than {MAX_ELEMENTS} elements", line=line)
         if tag.startswith("xacro:"):
             raise DescriptionError(f"<{tag}>: this file is a xacro macro; expand it first (xacro FILE > robot.urdf)", line=line)
-        open_.append(Element(tag, attributes, line))
+        open_.append(Element(tag, attributes, line, byte=parser.CurrentByteIndex))
         open_[-2].children.append(open_[-1])
 
     def refuse(*_: object) -> int:

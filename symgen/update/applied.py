@@ -1,0 +1,167 @@
+"""What `symgen.apply` returns: the new text of a file, and what of it changed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from runtime.json_documents import json_text
+from runtime.markup import number
+from runtime.result_files import write_all
+from runtime.table import Table, notebook
+
+NOTHING = 1e-12  # SI; smaller numbers are rounding
+TOLD = {"record": "the record", "sum": "the record, in sums", "file": "feasibility"}
+
+
+@dataclass(frozen=True)
+class Change:
+    """A number of the file.
+
+    Attributes
+    ----------
+    place, number, unit : str
+        Link or joint, which of its numbers, and its unit.
+    before, after : float
+        In the file, and in the new text.
+    sigma : float
+        Standard deviation that the record leaves, of the part that it tells; conditions of a physical robot aside.
+    told_by : str
+        record: determined; sum: only together with other numbers, this is the value nearest to the file; file: no torque depends on it,
+        and it changes only where no physical robot is left otherwise.
+    """
+
+    place: str
+    number: str
+    unit: str
+    before: float
+    after: float
+    sigma: float
+    told_by: str
+
+
+@dataclass(frozen=True)
+class Applied:
+    """A URDF or MJCF text with identified values.
+
+    Attributes
+    ----------
+    file, format : str
+        Name of the file, and URDF or MJCF.
+    before, content : bytes
+        The text as it was read, and the new one.
+    changes : tuple of Change
+        Numbers that changed.
+    added : tuple of str
+        Attributes and elements that the file did not have.
+    placeless : mapping, SI
+        Parameters that the format has no place for, by name.
+    joints : mapping
+        Names of their joints.
+    spread : tuple of str
+        Links on fixed joints that changed too, since no physical link was left otherwise.
+    undetermined : tuple of str
+        Numbers of links on which no torque of a motion depends; the file's, as far as a physical robot allows.
+    lost : tuple of str
+        Base parameters that the estimate does not hold or the record does not show; the file's.
+    """
+
+    file: str
+    format: str
+    before: bytes
+    content: bytes
+    changes: tuple[Change, ...]
+    added: tuple[str, ...]
+    placeless: Mapping[str, float]
+    joints: Mapping[str, str]
+    spread: tuple[str, ...]
+    undetermined: tuple[str, ...]
+    lost: tuple[str, ...]
+
+    def write(self, output: str | Path) -> Path:
+        """Write the new text, whole or not at all; the path. A file of that name is replaced."""
+        path = Path(output).resolve()
+        return write_all(path.parent, {path.name: self.content})[0]
+
+    @property
+    def names_files(self) -> bool:
+        """Whether the text names other files, meshes for example, relative to its own folder."""
+        return b"filename=" in self.content or b"file=" in self.content
+
+    def diff(self) -> str:
+        """Lines that differ, as `diff -u` shows them."""
+        old, new = (text.decode("utf-8", "replace").splitlines(keepends=True) for text in (self.before, self.content))
+        return "".join(difflib.unified_diff(old, new, self.file, f"{self.file} (identified)", n=0))
+
+    def table(self) -> Table:
+        """What changed, number by number."""
+        rows = [
+            (
+                c.place,
+                c.number,
+                f"{c.before if abs(c.before) > NOTHING else 0:.6g}",
+                f"{c.after:.6g}",
+                _percent(c),
+                number(c.sigma, ".2g"),
+                c.unit,
+                TOLD[c.told_by],
+            )
+            for c in self.changes
+        ]
+        return Table("changes", ("where", "number", "from", "to", "change %", "sigma", "unit", "told by"), rows, wide=(1, 6, 7))
+
+    def notes(self) -> list[str]:
+        """What a reader should know besides."""
+        notes = [f"added: {'; '.join(self.added)}"] if self.added else []
+        if self.placeless:
+            listed = ", ".join(
+                f"{name} = {x:.6g}" + (f" ({self.joints[name]})" if name in self.joints else "") for name, x in self.placeless.items()
+            )
+            notes.append(f"no place in a {self.format}, set these in your program: {listed}")
+        if self.spread:
+            notes.append(f"links on fixed joints that changed too, no physical link was left otherwise: {', '.join(self.spread)}")
+        if self.lost:
+            notes.append(f"not in the estimate, or not shown by the record: {', '.join(self.lost)}; the values of the file stay")
+        if self.undetermined:
+            notes.append(f"on which no torque of this robot depends, hence of the file: {_by_place(self.undetermined)}")
+        return notes
+
+    def __str__(self) -> str:
+        if not self.changes:
+            return "\n".join([f"{self.file}: no number changes", *(f"- {note}" for note in self.notes())])
+        head = f"{self.file}: {len(self.changes)} numbers change"
+        return "\n".join([head, "", self.table().to_text(), "", *(f"- {note}" for note in self.notes())])
+
+    def _repr_html_(self) -> str:
+        return notebook([f"{self.file}: {len(self.changes)} numbers change", *self.notes()], self.table())
+
+    def to_json(self) -> str:
+        """JSON text: file, format, changes, and what the notes say."""
+        return json_text(
+            {
+                "schema": "symgen-apply/1",
+                "file": self.file,
+                "format": self.format,
+                "changes": [asdict(change) for change in self.changes],
+                "added": self.added,
+                "placeless": dict(self.placeless),
+                "spread": self.spread,
+                "undetermined": self.undetermined,
+                "lost": self.lost,
+            }
+        )
+
+
+def _percent(c: Change) -> str:
+    return f"{100 * (c.after - c.before) / abs(c.before):+.2f}" if abs(c.before) > NOTHING else "-"
+
+
+def _by_place(lines: tuple[str, ...]) -> str:
+    """link: numbers; link: numbers."""
+    places: dict[str, list[str]] = {}
+    for line in lines:
+        place, _, what = line.partition(": ")
+        places.setdefault(place, []).append(what)
+    return "; ".join(f"{place}: {', '.join(whats)}" for place, whats in places.items())

@@ -1,0 +1,221 @@
+"""Identified values into the URDF or MJCF file of a robot, in place: numbers change, every other byte stays.
+
+    applied = symgen.apply("results", "arm.urdf")        # or an Estimate, an Identification
+    print(applied)                                       # what changes, from, to, deviation
+    applied.write("arm_identified.urdf")
+
+The estimate knows base parameters, sums of the parameters of several links. Of all physical robots that have these sums, the one nearest to the file is
+written (`symgen.update.nearest`). Before anything is returned the new text is read again: it must say what was to be written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from runtime.estimators.estimate import Estimate, load_estimate
+from runtime.model.generated import load_model
+from runtime.model.inertia import PhysicalModel, physical_model
+from symgen.description.files import SNAP, content_of, read_robot
+from symgen.description.robot import one_joint_parameters, parameter
+from symgen.description.tree import Array
+from symgen.description.tree_parts import Part
+from symgen.emit.certified import model as emitted
+from symgen.errors import DescriptionError
+from symgen.update.applied import Applied, Change
+from symgen.update.nearest import NONE, FileLink, Nearest, nearest
+from symgen.update.robot_text import RobotText, read_text, require_same_frames
+from symgen.update.xml_edits import Source, same
+
+AGREE = 1e-9  # of the size of a parameter: the written file is read as what was to be written
+FEASIBLE = "; identify again with estimate: {method: feasible} in the study"
+NO_SHARE = 1e-9  # of the largest share
+UNITS = {"FV": "N*m*s/rad", "FS": "N*m", "Ia": "kg*m**2", "OFFSET": "N*m", "K": "N*m/rad"}
+SLIDING = {"FV": "N*s/m", "FS": "N", "Ia": "kg", "OFFSET": "N", "K": "N/m"}
+
+
+def apply(
+    estimate: Estimate | str | Path | Any,
+    model: str | Path,
+    *,
+    robot: str | Path | None = None,
+    lock: Mapping[str, float] | None = None,
+    chain: tuple[str, str] | None = None,
+    nearly: float = SNAP,
+) -> Applied:
+    """The text of a URDF or MJCF file with identified values in it, and what changed; nothing is written yet.
+
+    Parameters
+    ----------
+    estimate : Estimate, Identification, str or Path
+        Result, its estimate.json, or the folder that `symgen identify -o` wrote. All base parameters, not the essential ones alone.
+    model : str or Path
+        The file: .urdf, or .xml and .mjcf (MJCF).
+    robot : str or Path, optional
+        Robot file that was identified, where it is not `model` itself: converted from it, perhaps with other elements or drives.
+    lock, chain, nearly
+        As of `read_robot`, and as when the robot was identified or converted.
+
+    Raises
+    ------
+    DescriptionError
+        The estimate is one of another robot, no physical robot has it, or the file has no place for it.
+    """
+    path = Path(model)
+    content = content_of(path)
+    part = Part(lock or {}, chain)
+    text = read_text(content, path, nearly, part)
+    described, of = (text.robot, text.file) if robot is None else (read_robot(robot)[0], Path(robot).name)
+    require_same_frames(text, described, of)
+    result = _estimate(estimate)
+    physical = physical_model(load_model(emitted(described)))
+    names, X, lost = _known(result, physical, of)
+    links = text.links
+    if not links:
+        raise DescriptionError("no link that moves has an inertial; values need one to go into", file=path.name)
+    families = one_joint_parameters(described, UNITS)
+    own = {parameter(family, j): (family, j) for j in text.table.joint for family in UNITS if parameter(family, j) in families}
+    stated = {name: text.joint_values(j)[family] for name, (family, j) in own.items()}
+    others = [name for name in physical.standard if name not in own and name not in _inertial(physical)]
+    try:
+        absent = [*others, *(name for name, x in stated.items() if not x)]
+        found = nearest(physical, links, stated | dict.fromkeys(others, 0.0), names, X, absent)
+        return _written(text, path, found, links, own, result, names, lost, part, nearly)
+    except DescriptionError as error:
+        again = FEASIBLE if error.message.startswith(NONE) and result.method != "feasible" else ""
+        raise DescriptionError(error.message + again, file=error.file or path.name, line=error.line) from error
+
+
+def _estimate(given: Any) -> Estimate:
+    if isinstance(given, str | Path):
+        path = Path(given)
+        return load_estimate(path / "estimate.json" if path.is_dir() else path)
+    given = getattr(given, "estimate", given)
+    if not isinstance(given, Estimate):
+        raise DescriptionError(f"{type(given).__name__} given as estimate; expected an Estimate, an Identification, or their estimate.json")
+    return given
+
+
+def _inertial(physical: PhysicalModel) -> set[str]:
+    return {physical.standard[k] for j in physical.links for k in physical.link(j)}
+
+
+def _known(result: Estimate, physical: PhysicalModel, of: str) -> tuple[list[str], Array, list[str]]:
+    """Names and values of the base parameters that the record tells, and names of the others."""
+    if unknown := [name for name in result.names if name not in physical.base]:
+        raise DescriptionError(
+            f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; name the robot file that was identified (--robot), and --chain, "
+            "--lock as when it was converted"
+        )
+    silent = {group[0] for group in result.groups if len(group) == 1}
+    known = [k for k, name in enumerate(result.names) if np.isfinite(result.X[k]) and name not in silent]
+    if not known:
+        raise DescriptionError("the estimate determines no parameter")
+    names = [result.names[k] for k in known]
+    return names, result.X[known], [name for name in physical.base if name not in names]
+
+
+def _written(
+    text: RobotText, path: Path, found: Nearest, links: Sequence[FileLink], own: Mapping[str, tuple[str, int]], result: Estimate,
+    names: Sequence[str], lost: list[str], part: Part, nearly: float,
+) -> Applied:  # fmt: skip
+    """The edited text, read again, with its changes."""
+    source, changes, undetermined = Source(text.content), [], []
+    root = _root(result, names)
+    moved = []
+    for link in links:
+        at = found.links[link.name]
+        place, ten = text.link(link), found.chi[at]
+        if np.allclose(ten, link.ten, rtol=1e-13, atol=1e-15):
+            ten = link.ten
+        else:
+            moved.append((place, ten))
+        rows = _link_changes(link, place.stated(), place, ten, found.gain[at] @ root, found.free[at], found.gain[at])
+        undetermined += [f"{row.place}: {row.number}" for row in rows if row.told_by == "file"]
+        changes += [row for row in rows if not same(row.before, row.after)]
+    text.write_links(source, moved)
+    for j, joint in text.table.joint.items():
+        mine = {family: name for name, (family, i) in own.items() if i == j and text.attribute(family, j)}
+        text.set_joint(source, j, {family: found.chi[found.elements[name]] for family, name in mine.items()})
+        units = SLIDING if joint.kind == "prismatic" else UNITS
+        for family, name in mine.items():
+            k = found.elements[name]
+            told = "record" if np.abs(found.free[k]).max() < NO_SHARE else "sum"
+            row = Change(f"joint {joint.name!a:.60}", str(text.attribute(family, j)), units[family], text.joint_values(j)[family],
+                         float(found.chi[k]), _norm(found.gain[k] @ root), told)  # fmt: skip
+            changes += [] if same(row.before, row.after) else [row]
+    placeless = {
+        name: float(found.chi[k])
+        for name, k in found.elements.items()
+        if (name not in own or not text.attribute(*own[name])) and not same(found.chi[k], found.chi0[k])
+    }
+    content = source.edited()
+    _require_read_back(read_text(content, path, nearly, part), found, own, text)
+    return Applied(
+        file=path.name,
+        format=text.elements.format,
+        before=text.content,
+        content=content,
+        changes=tuple(changes),
+        added=tuple(source.added),
+        placeless=placeless,
+        joints={name: text.table.joint[own[name][1]].name for name in placeless if name in own},
+        spread=found.spread,
+        undetermined=tuple(undetermined),
+        lost=tuple(lost),
+    )
+
+
+def _root(result: Estimate, names: Sequence[str]) -> Array:
+    """A root of the covariance of the known base parameters, (b, b), deviations corrected where they are; zero where there is none."""
+    at = [result.names.index(name) for name in names]
+    C = np.nan_to_num(result.covariance[np.ix_(at, at)])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.nan_to_num(np.fmax(result.sigma_corrected[at] / result.sigma[at], 1.0), nan=1.0, posinf=1.0)
+    values, V = np.linalg.eigh(C * np.outer(factor, factor))
+    return np.asarray(V * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _norm(row: Array) -> float:
+    return float(np.linalg.norm(row))
+
+
+def _link_changes(link: FileLink, stated: Sequence[float], place: Any, ten: Array, root: Array, free: Array, gain: Array) -> list[Change]:
+    """One row for each number of a link: from, to, deviation, and what tells it."""
+    labels = [(q.name, q.unit, label) for q in place.quantities(ten) for label in q.labels]
+
+    def numbers(x: Array) -> Array:
+        return np.array([value for q in place.quantities(x) for value in q.values])
+
+    new = numbers(ten)
+    new = np.where([same(x, y) for x, y in zip(new, stated, strict=True)], stated, new)
+    step = 1e-6 * np.maximum(np.abs(ten), 1e-3 * np.abs(ten).max())
+    J = np.array([(numbers(ten + e) - numbers(ten - e)) / (2 * h) for h, e in zip(step, np.diag(step), strict=True)]).T
+    rows = []
+    for k, (name, unit, label) in enumerate(labels):
+        number = name if name == label else f"{name} {label}"
+        share, left = _norm(J[k] @ gain), _norm(J[k] @ free)
+        size = _norm(J[k]) or 1.0
+        told = "file" if share < 1e-6 * size else "record" if left < 1e-6 * size else "sum"
+        rows.append(Change(f"link {link.name!a:.60}", number, unit, float(stated[k]), float(new[k]), _norm(J[k] @ root), told))
+    return rows
+
+
+def _require_read_back(again: RobotText, found: Nearest, own: Mapping[str, tuple[str, int]], text: RobotText) -> None:
+    """Raise DescriptionError unless the written text says what was to be written."""
+    for link in again.links:
+        wanted = found.chi[found.links[link.name]] if link.name in found.links else np.zeros(10)
+        if np.abs(link.ten - wanted).max() > AGREE * max(float(np.abs(wanted).max()), AGREE):
+            raise DescriptionError(
+                f"link {link.name!a:.60} would be read with other values than written (compiler settings that bound inertia?)"
+            )
+    for name, (family, j) in own.items():
+        if text.attribute(family, j) and abs(again.joint_values(j)[family] - found.chi[found.elements[name]]) > AGREE:
+            raise DescriptionError(
+                f"joint {again.table.joint[j].name!a:.60} would be read with another {text.attribute(family, j)} than written"
+            )
+    if len(again.links) != len(found.links):
+        raise DescriptionError("a link would be read without inertia; its mass becomes zero")
