@@ -1,7 +1,6 @@
 """`symgen apply`: in place or into another file, --check writes nothing, an existing file is whole or as it was, errors are one line."""
 
 import json
-import os
 from pathlib import Path
 
 import pytest
@@ -56,7 +55,7 @@ def test_check_writes_nothing(folder) -> None:
     assert (change["place"], change["number"], change["before"]) == ("joint 'a2'", "damping", 0.05) and changes[
         "schema"
     ] == "symgen-apply/1"
-    assert Path("arm.xml").read_text() == BRANCHES and sorted(os.listdir()) == ["arm.xml", "results"]
+    assert Path("arm.xml").read_text() == BRANCHES and sorted(p.name for p in Path().iterdir()) == ["arm.xml", "results"]
 
 
 def test_an_existing_file_is_never_half_written(folder, monkeypatch) -> None:
@@ -68,7 +67,7 @@ def test_an_existing_file_is_never_half_written(folder, monkeypatch) -> None:
 
     monkeypatch.setattr(result_files, "_write_durably", full)
     assert "nothing was changed" in run("results", "arm.xml", "-o", "new.xml", "--force", code=2).stderr
-    assert Path("new.xml").read_text() == "old" and sorted(os.listdir()) == ["arm.xml", "new.xml", "results"]
+    assert Path("new.xml").read_text() == "old" and sorted(p.name for p in Path().iterdir()) == ["arm.xml", "new.xml", "results"]
 
 
 def test_a_link_to_the_file_stays_one(folder) -> None:

@@ -131,7 +131,7 @@ def test_what_no_physical_robot_has_is_refused_with_the_reason(tmp_path) -> None
 def test_estimates_of_other_robots_are_refused(tmp_path) -> None:
     path = written(tmp_path, "arm.urdf")
     tx40 = symgen.model("tx40")
-    with pytest.raises(DescriptionError, match="no base parameters of arm.urdf.*--robot"):
+    with pytest.raises(DescriptionError, match=r"no base parameters of arm\.urdf.*--robot"):
         symgen.apply(exact(tx40, dict(tx40.VALUES)), path)
     with pytest.raises(DescriptionError, match="other frames"):
         symgen.apply(exact(tx40, dict(tx40.VALUES)), path, robot="tx40")
