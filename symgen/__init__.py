@@ -4,6 +4,7 @@
     base = symgen.regrouping(symgen.load_robot("tx40"))   # base parameters, each with its formula
     symgen.certify(base).valid                        # exact rank and identities, independent dynamics, emitted module
     symgen.apply("results", "arm.urdf").write("new.urdf")  # identified values into the user's own URDF or MJCF
+    symgen.symbolic("tx40").inertia_matrix()          # any model as SymPy objects
 
 Names are loaded when they are first used.
 """
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from symgen.regroup.certificate import Certificate
     from symgen.regroup.regrouping import BaseParameter, Regrouping
     from symgen.regroup.regrouping import regroup as regrouping
+    from symgen.symbols.symbolic import SymbolicRobot, symbolic
     from symgen.update.applied import Applied
     from symgen.update.apply import apply
 
@@ -29,6 +31,7 @@ __all__ = [
     "Certificate",
     "Regrouping",
     "Robot",
+    "SymbolicRobot",
     "SymgenError",
     "apply",
     "certify",
@@ -38,12 +41,14 @@ __all__ = [
     "packaged_robots",
     "parse_robot",
     "regrouping",
+    "symbolic",
 ]
 
 _HOME = {
     **dict.fromkeys(("Robot", "load_robot", "packaged_robots", "parse_robot"), "symgen.description"),
     **dict.fromkeys(("BaseParameter", "Regrouping"), "symgen.regroup.regrouping"),
     **dict.fromkeys(("certify", "model"), "symgen.emit.certified"),
+    **dict.fromkeys(("SymbolicRobot", "symbolic"), "symgen.symbols.symbolic"),
     "Certificate": "symgen.regroup.certificate",
     "generate_module": "symgen.emit.generate",
     "Applied": "symgen.update.applied",

@@ -29,6 +29,8 @@ FAMILIES = {
     "VSP": "acceleration of the origin of a frame minus gravity, in the antecedent's frame",
     "VP": "the same, in the frame itself",
     "Z": "axis of a joint, in the frame of a later link",
+    "ZP": "rate of change of such an axis",
+    "VO": "velocity of a frame's origin, in that frame",
     "V": "velocity of a frame's origin per unit rate of a joint, in that frame",
     "VS": "the same, in the antecedent's frame",
     "F": "force that moves a link",

@@ -1,0 +1,220 @@
+"""`symgen.symbolic`: the models of a robot as SymPy objects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from symgen.description.files import load_robot
+from symgen.description.robot import Robot
+from symgen.errors import SymgenError
+from symgen.symbols.derivation import Source, source_of
+from symgen.symbols.models import MODELS, Request
+from symgen.symbols.printing import printed
+from symgen.symbols.symbolic_model import LARGEST, SymbolicModel
+
+
+def symbolic(
+    robot: Robot | str | Path,
+    *,
+    parameters: str = "base",
+    gravity: str | None = None,
+    values: Mapping[str, Any] | None = None,
+    passive: str | None = None,
+    limit: int = LARGEST,
+) -> SymbolicRobot:
+    """The models of a robot as exact SymPy objects: closed forms by method, recursions by `equations`.
+
+    Parameters
+    ----------
+    robot : Robot, str or Path
+        A robot, a packaged name or a file, as of `load_robot`.
+    parameters : str
+        "base": the dynamics in base parameters; "standard": in XX1, ..., M1, Ia1, ...
+    gravity : str, optional
+        "number" puts the value of the robot file in the place of its symbol, "symbol" the symbol g in the place of a number; as in the file where left out.
+    values : mapping, optional
+        Value of any symbol (constants, q1, QP1, QDP1, parameters), by name: a number, or a text as in robot files ("pi/2"). Zeros leave the recursion.
+    passive : str, optional
+        Of closed loops. "functions": passive joints in terms of the actuated ones, where the relation is linear. "symbols": all of them stay
+        symbols, with `closure` zero. Left out: functions where there are any, symbols for the rest.
+    limit : int
+        Terms that a closed form may have, multiplied out; a longer one is refused, its recursion never.
+
+    Returns
+    -------
+    SymbolicRobot
+        Nothing is derived before a model is asked for.
+
+    Raises
+    ------
+    SymgenError
+        A value for a symbol that is none, or functions that passive joints do not have.
+    """
+    described = robot if isinstance(robot, Robot) else load_robot(robot)
+    return SymbolicRobot(source_of(described, parameters, gravity, values, passive), limit)
+
+
+@dataclass(frozen=True)
+class SymbolicRobot:
+    """The models of a robot. Frames are numbered as in the robot file, 0 is the base; `of` is the last frame where left out.
+
+    Twists (velocity, acceleration, rows of the Jacobian) are those of the origin of frame `of`, then angular, in components of frame `frame`.
+    """
+
+    source: Source
+    limit: int = LARGEST
+
+    def model(self, name: str, *, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None) -> SymbolicModel:
+        """A model in both its forms. Raises SymgenError for a model or a frame that there is none of."""
+        if name not in MODELS:
+            raise SymgenError(f"no model is called {name!r}; expected one of {', '.join(MODELS)}")
+        robot = self.source.robot
+        of = robot.frames[-1].j if of is None else of
+        for j in (of, frame):
+            if j != 0 and j not in {f.j for f in robot.frames}:
+                raise SymgenError(f"frame {j} does not exist; {robot.name} has frames 0 to {robot.frames[-1].j}")
+        return SymbolicModel(MODELS[name], self.source, Request(of, frame), None if rows is None else tuple(rows), self.limit)
+
+    def _sympy(self, name: str, **request: Any) -> Any:
+        from symgen.symbols.sympy_objects import of_model
+
+        return of_model(self.model(name, **request))
+
+    def equations(self, name: str, *, of: int | None = None, frame: int = 0) -> tuple[list[tuple[Any, Any]], Any]:
+        """The recursion of a model: [(symbol, expression)] in order, under the names of SYMORO, and the model in these symbols (as `sympy.cse`)."""
+        from symgen.symbols.sympy_objects import of_listing
+
+        return of_listing(self.model(name, of=of, frame=frame))
+
+    def show(
+        self,
+        name: str,
+        *,
+        form: str = "closed",
+        format: str = "text",
+        of: int | None = None,
+        frame: int = 0,
+        rows: Sequence[int] | None = None,
+    ) -> str:
+        """A model as `symgen show --model` prints it; it needs no sympy but for format="sympy".
+
+        form : closed or recursive. format : text, latex (a document that compiles), latex-fragment (its formulas alone), sympy (Python), json.
+        """
+        return printed(self.model(name, of=of, frame=frame, rows=rows), form, format)
+
+    # --- symbols ---
+
+    @cached_property
+    def symbols(self) -> dict[str, Any]:
+        """Every symbol by name: constants, positions, velocities, accelerations, torques, parameters."""
+        from symgen.symbols.sympy_objects import symbol
+
+        robot = self.source.robot
+        joints = [f"{state}{j}" for state in ("q", "QP", "QDP", "GAM") for j in robot.moving]
+        return {name: symbol(name) for name in (*robot.constants, *joints, *self.source.parameters)}
+
+    @property
+    def q(self) -> tuple[Any, ...]:
+        """Positions of the actuated joints."""
+        return tuple(self.symbols[f"q{j}"] for j in self.source.robot.joints)
+
+    @property
+    def qd(self) -> tuple[Any, ...]:
+        """Velocities of the actuated joints, QP1 ..."""
+        return tuple(self.symbols[f"QP{j}"] for j in self.source.robot.joints)
+
+    @property
+    def qdd(self) -> tuple[Any, ...]:
+        """Accelerations of the actuated joints, QDP1 ..."""
+        return tuple(self.symbols[f"QDP{j}"] for j in self.source.robot.joints)
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """Base or standard parameters, in the order of the columns of the regressor."""
+        return tuple(self.symbols[name] for name in self.source.parameters)
+
+    # --- geometry and kinematics ---
+
+    def pose(self, of: int | None = None, frame: int = 0) -> Any:
+        """Homogeneous transform (4, 4): axes and origin of frame `of` in frame `frame`, any two frames."""
+        return self._sympy("pose", of=of, frame=frame)
+
+    def jacobian(self, of: int | None = None, frame: int = 0) -> Any:
+        """Jacobian (6, n) of frame `of`, in components of frame `frame`."""
+        return self._sympy("jacobian", of=of, frame=frame)
+
+    def determinant(self, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None) -> Any:
+        """Determinant of the Jacobian with six joints, or of as many of its rows (from 1) as there are joints; rows that are not zero if left out."""
+        return self._sympy("determinant", of=of, frame=frame, rows=rows)
+
+    def jacobian_rate(self, of: int | None = None, frame: int = 0) -> Any:
+        """Jd qd (6, 1): the acceleration twist at qdd = 0, derivative in space."""
+        return self._sympy("jacobian_rate", of=of, frame=frame)
+
+    def velocity(self, of: int | None = None, frame: int = 0) -> Any:
+        """Velocity twist (6, 1) of frame `of`."""
+        return self._sympy("velocity", of=of, frame=frame)
+
+    def acceleration(self, of: int | None = None, frame: int = 0) -> Any:
+        """Acceleration twist (6, 1) of frame `of`, without gravity, derivative in space."""
+        return self._sympy("acceleration", of=of, frame=frame)
+
+    # --- dynamics ---
+
+    def inverse_dynamics(self) -> Any:
+        """Gamma (n, 1) = A qdd + C qd + Q + friction."""
+        return self._sympy("inverse_dynamics")
+
+    def inertia_matrix(self) -> Any:
+        """A(q), (n, n), actuators included."""
+        return self._sympy("inertia_matrix")
+
+    def coriolis(self, by: str = "christoffel") -> Any:
+        """C(q, qd), (n, n): by the Christoffel symbols of A, or by "recursion" over the links; both are the same matrix, Ad - 2C is skew symmetric."""
+        if by not in ("christoffel", "recursion"):
+            raise SymgenError(f"by={by!r}; expected christoffel or recursion")
+        from symgen.symbols.sympy_objects import of_model
+
+        model = self.model("coriolis")
+        model.refuse_tied("C(q, qd)")
+        return of_model(model if by == "christoffel" else replace(model, model=replace(model.model, name="coriolis by recursion")))
+
+    def bias(self) -> Any:
+        """H(q, qd), (n, 1): Gamma at qdd = 0, friction included."""
+        return self._sympy("bias")
+
+    def gravity(self) -> Any:
+        """Q(q), (n, 1): Gamma at rest without friction."""
+        return self._sympy("gravity")
+
+    def friction(self) -> Any:
+        """Viscous and Coulomb friction, (n, 1)."""
+        return self._sympy("friction")
+
+    def kinetic_energy(self) -> Any:
+        """E(q, qd), actuators included: qd' A qd / 2."""
+        return self._sympy("kinetic_energy")
+
+    def potential_energy(self) -> Any:
+        """U(q) of gravity, springs and offsets: dU/dq = Q. In base parameters up to a constant."""
+        return self._sympy("potential_energy")
+
+    def forward_dynamics(self) -> Any:
+        """qdd (n, 1) = A**-1 (Gamma - H), up to three joints; Gamma is GAM1 ..."""
+        return self._sympy("forward_dynamics")
+
+    def regressor(self) -> Any:
+        """D of Gamma = D chi, (n, number of parameters): D_s with standard parameters, D with base parameters."""
+        return self._sympy("regressor")
+
+    def base_parameters(self) -> dict[Any, Any]:
+        """What each parameter is made of: {ZZ1R: ZZ1 + Ia1 + ...}."""
+        return dict(zip(self.parameters, self._sympy("base_parameters"), strict=True))
+
+    def closure(self) -> Any:
+        """Residuals of the loops (m, 1) in the joints that stay symbols: zero where the loops close."""
+        return self._sympy("closure")
