@@ -63,7 +63,7 @@ def steps_table(name, model, study, record, names):
     first = advice.encoders[0]
     part = perturbation(model, record, study, names)
     system = linear_system(part.observation, replace(study.estimate, columns="all"))
-    task = Task((prepared(record, study),), model, tuple(names), replace(study.estimate, columns="all"), study.cestac, (), None, {})
+    task = Task((prepared(model, record, study),), model, tuple(names), replace(study.estimate, columns="all"), study.cestac, (), None, {})
     level = partial(sampled_level, task, (part,), assemble(system, system.solve(), model=model))
     low, high = first.limits[0].delta / RATIO**2, first.delta[-1] / RATIO
     grid = np.geomspace(low, high, round(np.log(high / low) / np.log(RATIO)) + 1)

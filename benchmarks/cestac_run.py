@@ -64,7 +64,14 @@ def task_of(model: GeneratedModel, record: Record, study: Study, names: tuple[st
     study = replace(study, cestac=replace(study.cestac, median=1))
     drives = Drives.from_mapping(model.DRIVES) if model.DRIVES else None
     return Task(
-        (prepared(record, study),), model, names, replace(study.estimate, columns="all"), study.cestac, levels_of(study.cestac), drives, {}
+        (prepared(model, record, study),),
+        model,
+        names,
+        replace(study.estimate, columns="all"),
+        study.cestac,
+        levels_of(study.cestac),
+        drives,
+        {},
     )
 
 

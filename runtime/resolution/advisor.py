@@ -146,7 +146,14 @@ def advise(
     decisive = [names.index(name) for name in deciding_names(reference)]
     every = range(len(model.JOINTS))
     task = Task(
-        tuple(prepared(record, study) for record in records), model, names, settings, study.cestac, (), drives, dict(constants or {})
+        tuple(prepared(model, record, study, drives) for record in records),
+        model,
+        names,
+        settings,
+        study.cestac,
+        (),
+        drives,
+        dict(constants or {}),
     )
     units = joint_units(model) if study.cestac.side == "joint" else ("rad",) * len(model.JOINTS)  # motors turn
     selections = _selections(model, encoders)

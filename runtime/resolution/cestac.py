@@ -108,6 +108,11 @@ def cestac(
         raise SettingsError(
             f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("cestac", "side")
         )
+    if study.signals.reader == "counts" and settings.delta and settings.rounding != "phase":
+        raise SettingsError(
+            f"{settings.rounding} with signals.reader: counts; it rounds every sample anew and destroys the edges that counts are read by, use phase",
+            path=("cestac", "rounding"),
+        )
     if scheduler and workers:
         raise InputError("a scheduler has workers of its own; leave out workers")
     loop = loop_of(model, records, study, simulator)
@@ -120,7 +125,7 @@ def cestac(
     if loop is not None:
         study = replace(study, estimate=without_loop_options(study.estimate))
     task = Task(
-        records=prepared_records(records, study, loop),
+        records=prepared_records(model, records, study, drives, loop),
         model=model,
         names=study_columns(model, records, study, columns, constants, loop),
         estimate=replace(study.estimate, columns="all"),
@@ -158,7 +163,7 @@ def cestac(
         levels=tuple(level_result(level, own, measured, reference) for level, own in levels),
         settings=described,
         provenance={**reference.provenance, "seed": settings.seed, "processor": processor()},
-        notes=notes(study, loop),
+        notes=(*notes(study, loop), *(record.note for record in task.records if record.note)),
     )
 
 

@@ -86,7 +86,7 @@ class Loop:
         """The loop of the measured records; of place loop, of one made with the encoder of the study."""
         if self.study.cestac.place == "record":
             return closed_loop(self.model, self.records, self.study, self.simulator, **self.options)
-        return self._of(self.simulator, self.simulator.controller.seed)
+        return self._of(self.simulator, self.simulator.controller.seed, 0.0)
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
         """`observation` of the perturbed positions of every record, shape (N, n), with the loop attached."""
@@ -101,12 +101,17 @@ class Loop:
         simulator: Any = copy(self.simulator)
         if level.delta:
             simulator.law = replace(law, encoder_step=np.full(n, level.delta), offset=law.offset + np.linalg.solve(law.R, phase))
-        return self._of(simulator, int(random.integers(2**31)))
+        return self._of(simulator, int(random.integers(2**31)), level.delta)
 
-    def _of(self, simulator: Any, seed: int) -> ClosedLoop:
-        """A record made by `simulator`, under the loop without its steps."""
+    def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
+        """A record made by `simulator`, under the loop without its steps; the reader of counts is told them, and needs some."""
         record = simulator.run(self.truth, self.reference, seed=seed, name=f"{SIMULATED} {self.model.NAME}").record()
-        return closed_loop(self.model, [record], self.study, self.simulator, **self.options)
+        signals, step = self.study.signals, delta or self.simulator.controller.encoder.step
+        if signals.reader == "counts" and step:
+            signals = replace(signals, step=step, side=self.study.cestac.side)
+        elif signals.reader == "counts":
+            signals = replace(signals, reader="lowpass", step=None, side="joint")
+        return closed_loop(self.model, [record], replace(self.study, signals=signals), self.simulator, **self.options)
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from runtime.errors import InputError
+from runtime.estimators.closed_loop import LoopPart
 from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import linear_companion, observed, point_estimate
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, ModelText, base_columns
-from runtime.observation.filters import filtered_states
+from runtime.observation.filters import States, filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, stack
 from runtime.observation.rows import Selection, select_rows
+from runtime.observation.states import observed_states
 from runtime.records.record import Record
 from runtime.resolution.loop import Loop, LoopText
+from runtime.resolution.own_encoder import OwnEncoder, own_encoder
 from runtime.resolution.rounding import VARIANCE, rounded, stream
 from runtime.resolution.runs import Level
 from runtime.settings.study import CestacSettings, EstimateSettings, Study
@@ -45,6 +49,12 @@ class PreparedRecord:
         Rows used: those of the measured record.
     torque : ndarray, shape (n, K), N m or N
         Y before rows are left out.
+    states : States or None
+        Of the record as measured, where it can be read as counts; None: by the low-pass.
+    own : OwnEncoder or None
+        The encoder that made it, under law phase.
+    note : str
+        Why the record as measured is not read as counts, where the study asks for counts.
     """
 
     q: Array
@@ -53,6 +63,9 @@ class PreparedRecord:
     files: Mapping[str, str]
     selection: Selection
     torque: Array
+    states: States | None = None
+    own: OwnEncoder | None = None
+    note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,21 +108,40 @@ class Task:
         return (replace(self, loop=self.loop.load(model)) if isinstance(self.loop, LoopText) else self), model
 
 
-def prepared(record: Record, study: Study) -> PreparedRecord:
-    """Rows and torques of the measured record, through the filters of the study with the median of study.cestac."""
+def prepared(
+    model: GeneratedModel, record: Record, study: Study, drives: Drives | None = None, part: LoopPart | None = None
+) -> PreparedRecord:
+    """Rows and torques of the measured record, through the filters of the study with the median of study.cestac.
+
+    part : rows of a simulated loop, chosen by its reference; default: by the measured velocities.
+    """
     signals = replace(study.signals, median=study.cestac.median)
-    selection = select_rows(record, filtered_states(record.q, record.rate, signals).qd, signals, study.rows)
-    return PreparedRecord(record.q, record.tau, record.rate, dict(record.files), selection, decimated_torque(record.tau, selection))
+    counts, note = None, ""
+    if signals.reader == "counts":
+        try:
+            counts = observed_states(model, record.q, record.rate, signals, drives=drives, name=record.name)
+        except InputError as e:
+            if signals.step is not None:
+                raise
+            note = f"As measured, {e}; the estimate that runs are compared with takes these positions as they are, by the low-pass."
+    if part is None:
+        states = counts or filtered_states(record.q, record.rate, signals)
+        selection = select_rows(record, states.qd, signals, study.rows)
+        torque = decimated_torque(record.tau, selection)
+    else:
+        selection, torque = part.selection, part.torque
+    own = own_encoder(record, study, drives)
+    return PreparedRecord(record.q, record.tau, record.rate, dict(record.files), selection, torque, counts, own, note)
 
 
-def prepared_records(records: Sequence[Record], study: Study, loop: Loop | None = None) -> tuple[PreparedRecord, ...]:
-    """Rows and torques of every record; where a loop is simulated, rows are those of its reference, and of an encoder inside it none are kept."""
-    if loop is None:
-        return tuple(prepared(record, study) for record in records)
+def prepared_records(
+    model: GeneratedModel, records: Sequence[Record], study: Study, drives: Drives | None = None, loop: Loop | None = None
+) -> tuple[PreparedRecord, ...]:
+    """Rows and torques of every record; none where the encoder stands in the loop, whose records are made anew."""
     if study.cestac.place == "loop":
         return ()
-    parts = zip(records, loop.closed.parts, strict=True)
-    return tuple(PreparedRecord(r.q, r.tau, r.rate, dict(r.files), part.selection, part.torque) for r, part in parts)
+    parts = [None] * len(records) if loop is None else list(loop.closed.parts)
+    return tuple(prepared(model, record, study, drives, part) for record, part in zip(records, parts, strict=True))
 
 
 def column_errors(model: GeneratedModel, records: Sequence[Record], study: Study, names: Sequence[str]) -> Array | None:
@@ -175,18 +207,39 @@ def perturbed(model: GeneratedModel, task: Task, level: Level, draw: tuple[int, 
     if loop is not None and task.settings.place == "loop":
         return (loop.simulated(level, draw) if draw else loop.closed).measured().columns(task.names)
     keys = [stream_keys(draw, k) for k in range(len(task.records))]
-    positions = [perturbed_position(r.q, level, task.settings, task.drives, own) for r, (own, _) in zip(task.records, keys, strict=True)]
+    positions = [run_position(task, r, level, own) for r, (own, _) in zip(task.records, keys, strict=True)]
     torques = [torque_rows(task, r, level, own) for r, (_, own) in zip(task.records, keys, strict=True)]
-    observation = system_of(model, task, positions, torques)
+    observation = system_of(model, task, positions, torques, level)
     return observation if loop is None else loop.perturbed(observation, positions)
 
 
-def system_of(model: GeneratedModel, task: Task, positions: Sequence[Array], torques: Sequence[Array]) -> Observation:
-    """The stacked system of positions, shape (N, n), and torque rows, shape (n, K), of every record, by the way of the identification."""
+def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
+    """q_CESTAC of one run, from the measured positions or, where steps are hardly coarser than those of the record, from a draw."""
+    q = record.q
+    if level.delta and record.own is not None:
+        q = record.own.positions(q, level.delta, stream(task.settings.seed, *key, 0))
+    return perturbed_position(q, level, task.settings, task.drives, key)
+
+
+def run_states(model: GeneratedModel, task: Task, record: PreparedRecord, q: Array, level: Level) -> States:
+    """States of joint positions q, shape (N, n), by the reader of the study, which knows the steps of the level but not their phase."""
+    signals = record.selection.signals
+    if signals.reader == "lowpass" or not level.delta:
+        return record.states or filtered_states(q, record.rate, signals)
+    return observed_states(model, q, record.rate, replace(signals, step=level.delta, side=task.settings.side), drives=task.drives)
+
+
+def system_of(
+    model: GeneratedModel, task: Task, positions: Sequence[Array], torques: Sequence[Array], level: Level | None = None
+) -> Observation:
+    """The stacked system of positions, shape (N, n), and torque rows, shape (n, K), of every record, by the way of the identification.
+
+    level : steps that the reader of counts is told; default: none, positions as they are.
+    """
     observations = [
         observation_from_states(
             model,
-            filtered_states(q, record.rate, record.selection.signals),
+            run_states(model, task, record, q, level or Level(0.0)),
             torque,
             record.selection,
             files=record.files,

@@ -25,7 +25,7 @@ from runtime.model.narrowing import narrowed
 from runtime.observation.filters import States, decimation_plan, filtered_states
 from runtime.observation.regressor_signals import DecimatedSignals, distinct_entries
 from runtime.resolution.c.workspace import CompiledWorkspace
-from runtime.resolution.perturbed import PreparedRecord, Task, perturbed, perturbed_position, stream_keys, torque_rows, with_deviation
+from runtime.resolution.perturbed import PreparedRecord, Task, perturbed, run_position, stream_keys, torque_rows, with_deviation
 from runtime.resolution.rounding import ADDED, noise, stream
 from runtime.resolution.runs import TRIANGULAR, Level, Run, Runs
 
@@ -46,7 +46,8 @@ def one_run(task: Task, key: tuple[int, int]) -> Run:
     draw = (run,) if task.settings.common else (number, run)
     if task.estimate.method not in LINEAR:
         return _estimated(work, key, level, draw)
-    if task.estimate.method != "ols" or task.estimate.options or task.loop is not None:
+    fused = task.loop is None and all(record.selection.signals.reader == "lowpass" for record in task.records)
+    if task.estimate.method != "ols" or task.estimate.options or not fused:
         system = linear_system(perturbed(work.model, work.task, level, draw), task.estimate)
         X = system.solve().X
         norms, method = np.array([joint.residual_norm(X) for joint in system.raw.joints]), TRIANGULAR
@@ -124,7 +125,7 @@ class RecordWorkspace:
             xi, q = self._filtered_noise(key), self.filtered
             return self._of(States(q.q + level.delta * xi.q, q.qd + level.delta * xi.qd, q.qdd + level.delta * xi.qdd))
         task = self.work.task
-        q_run = perturbed_position(self.q, level, task.settings, task.drives, key)
+        q_run = run_position(task, self.record, level, key)
         return self._of(filtered_states(np.asfortranarray(q_run), self.record.rate, self.selection.signals))
 
     def _of(self, states: States) -> Array:

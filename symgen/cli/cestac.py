@@ -29,6 +29,9 @@ def cestac(
     method: Annotated[
         str | None, typer.Option(help="Estimator in place of the study's: ols, wls, irls, tls, iv, didim, cloe, feasible.")
     ] = None,
+    reader: Annotated[
+        str | None, typer.Option(help="lowpass: positions as they are; counts: as counts of an encoder (with --rounding phase).")
+    ] = None,
     place: Annotated[
         str | None, typer.Option(help="record: recorded positions are rounded; loop: the encoder of the study's closed loop, in every run.")
     ] = None,
@@ -76,7 +79,7 @@ def cestac(
         study = session.changed(study, "cestac", **given, columns=session.names_of(columns))
         if study.cestac.place == "record":
             session.require_record(study, record[0])
-        study = session.changed(study, "estimate", method=method)
+        study = session.changed(session.changed(study, "estimate", method=method), "signals", reader=reader)
         records = read_records(study.record, model)
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice

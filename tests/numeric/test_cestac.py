@@ -251,7 +251,7 @@ def test_runs_without_an_estimate_are_left_out_and_counted():
     runs = [Run(0, k, tuple(reference.X * (1 + share)), 1.0) for k, share in enumerate((0.0, 0.02, np.nan))]
     result = level_result(Level(1e-3), Runs.of(runs, 3), Measured, reference)
     assert np.allclose(result.e, 1.0) and "1 of 3 runs found no estimate" in result.message
-    with pytest.raises(InputError, match="finds 1 estimates of 2 runs at 0.001"):
+    with pytest.raises(InputError, match=r"finds 1 estimates of 2 runs at 0\.001"):
         level_result(Level(1e-3), Runs.of(runs[1:], 3), Measured, reference)
 
 

@@ -19,7 +19,7 @@ from runtime.model.generated import GeneratedModel
 from runtime.resolution.c import kernels
 from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.self_test import unavailable
-from runtime.resolution.perturbed import PreparedRecord, Task, perturbed_position, stream_keys, torque_rows
+from runtime.resolution.perturbed import PreparedRecord, Task, run_position, stream_keys, torque_rows
 from runtime.resolution.rounding import bits, stream
 from runtime.resolution.runs import Level
 
@@ -65,7 +65,7 @@ class CompiledWorkspace:
             up = bits(q.shape, stream(settings.seed, *key))
             states = kernels.FilteredStates(q, record.rate, selection.signals, room, up=up, step=level.delta)
         else:
-            moved = perturbed_position(q, level, settings, self.task.drives, key)
+            moved = run_position(self.task, record, level, key)
             states = kernels.FilteredStates(moved, record.rate, selection.signals, room)
         y = kernels.decimated(self.entries, states, selection.samples, selection.factor, selection.signals.decimate, self.constants, room)
         if not np.isfinite(y).all():
