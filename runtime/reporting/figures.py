@@ -34,6 +34,8 @@ STYLE: Any = {
     "path.simplify": True,
 }
 DPI = 150
+LAYOUT: Any = "constrained"
+"""How panels get their places; the search takes a third of the time of a figure."""
 
 
 def svg(figure: Figure) -> bytes:
@@ -186,13 +188,17 @@ def shared_legend(figure: Figure, ax: Axes, columns: int, *, size: float = STYLE
 
 
 def empty_figure(size: tuple[float, float]) -> Figure:
-    figure = Figure(figsize=size, layout="constrained")
+    figure = Figure(figsize=size, layout=LAYOUT)
     FigureCanvasAgg(figure)
     return figure
 
 
 def _rendered(figure: Figure, form: str) -> bytes:
+    """The figure in one form. Panels get their places once: matplotlib alone would seek them twice for each form."""
     stream = BytesIO()
     with mpl.rc_context(STYLE):
+        if (engine := figure.get_layout_engine()) is not None:
+            engine.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(stream, format=form, dpi=DPI, metadata={"Date": None} if form == "svg" else {"Software": None})
     return stream.getvalue()

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import lru_cache
 
 from symgen.derive.columns import element_names, inertial_names
 from symgen.derive.exact import Draw, Fp
@@ -119,6 +120,12 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     SymgenError
         A general loop closes in too few states near its start.
     """
+    return _regrouped(robot, seed)
+
+
+@lru_cache(maxsize=16)
+def _regrouped(robot: Robot, seed: int) -> Regrouping:
+    """Kept, since formulas, certificate and module of a robot are asked for one after the other."""
     given, robot = robot, numbered(robot)
     transfer = Transfer(robot)
     names = preference(robot, transfer.kept)

@@ -1,4 +1,4 @@
-"""README and docs: the default run checks what every block names and runs the examples and two pages; the campaign runs every block of every page.
+"""README and docs: the default run checks what every block names and runs the examples and the README; the campaign runs every block of every page.
 
 A page becomes one script in an empty folder: its Python blocks share a namespace, its commands run with `symgen` on PATH, a YAML block whose first
 line is `# NAME.yaml` is written to that file. `# exit code 1` at the end of a block of commands says what its last command ends with. ```text is not run.
@@ -33,7 +33,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
 FENCE = re.compile(r"^```(?P<kind>python|sh|yaml)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
-SOON = ("README", "tools")  # pages that the default run runs
+SOON = ("README",)  # pages that the default run runs
 BY_CI = "python3 -m venv"  # blocks that .ci/run takes from the README and runs itself
 RUN = """
 def sh(text, code):

@@ -54,6 +54,12 @@ def search(planar: tuple, asked: ExcitationSettings) -> object:
     return excite(planar[0], study=replace(STUDY, excitation=asked))
 
 
+@pytest.fixture(scope="module")
+def free(planar: tuple) -> object:
+    """What the search finds without further limits."""
+    return search(planar, settings())
+
+
 def test_smooth_sign_is_tanh_and_nothing_else_changes(planar: tuple) -> None:
     symbolic = load_symbolic(planar[1])
     smooth = smoothed(symbolic.regressor, 1e-4)
@@ -92,10 +98,10 @@ def test_motion_within_limits_and_better_than_the_start(planar: tuple, criterion
     assert np.allclose(parts[0].family.joint(np.array([4.0]), parts[0].p[:, 0], np)[0], parts[1].p[0, 0], atol=1e-5)
 
 
-def test_prediction_is_what_identification_finds(planar: tuple) -> None:
-    """200 draws of white torque noise at the raw rate: scatter of the weighted estimate against the predicted %sigma, within 20 %."""
+def test_prediction_is_what_identification_finds(planar: tuple, free: object) -> None:
+    """60 draws of white torque noise at the raw rate: scatter of the weighted estimate against the predicted %sigma, within 20 %."""
     model, _, X = planar
-    found = search(planar, settings())
+    found = free
     t, q, qd, qdd = found.motion.sampled(1000.0)
     clean = model.inverse_dynamics(q, qd, qdd, X)
     asked = replace(STUDY, estimate=replace(STUDY.estimate, method="wls"))
@@ -120,9 +126,8 @@ def _power_kept() -> float:
     return float(np.var(decimate(noise, 10, zero_phase=True)[50:-50]))
 
 
-def test_torque_limits_hold(planar: tuple) -> None:
+def test_torque_limits_hold(planar: tuple, free: object) -> None:
     model, _, X = planar
-    free = search(planar, settings())
     largest = np.abs(model.inverse_dynamics(*free.motion.sampled(1000.0)[1:], X)).max(axis=0)
     asked = settings(limits={**LIMITS, "tau": (0.8 * largest).tolist()}, torque_rms=(0.5 * largest).tolist(), smooth=0.02, iterations=200)
     found = search(planar, asked)
@@ -131,10 +136,9 @@ def test_torque_limits_hold(planar: tuple) -> None:
     assert np.all(np.sqrt(np.mean(tau**2, axis=0)) <= 0.5 * largest)
 
 
-def test_torque_rate_leaves_the_jump_of_dry_friction_out(planar: tuple) -> None:
+def test_torque_rate_leaves_the_jump_of_dry_friction_out(planar: tuple, free: object) -> None:
     """A reversal of joint 1 switches 2 * 2 N m of dry friction between two samples: 4000 N m/s at 1 kHz, whatever the motion does."""
     model, _, X = planar
-    free = search(planar, settings())
     t, q, qd, qdd, tau = free.sampled()
     assert (np.diff(np.sign(qd[:, 0])) != 0).any() and np.abs(np.gradient(tau, t, axis=0)).max() > 1500
     smooth = model.inverse_dynamics(q, qd, qdd, X * dry_friction(model).smooth)

@@ -94,8 +94,8 @@ def test_friction_under_load_is_found(arm) -> None:
 
 
 def test_two_records_are_one_curve(arm) -> None:
-    record, fit = simulated(arm, coulomb)
-    other, _ = simulated(arm, coulomb, seed=1)
+    record, fit = simulated(arm, coulomb, seconds=15.0)
+    other, _ = simulated(arm, coulomb, seconds=15.0, seed=1)
     one, two = friction_curves(arm, [record], STUDY, fit)[0], friction_curves(arm, [record, other], STUDY, fit)[0]
     assert len(two.v) == 2 * len(one.v) and two.laws[0].sigma["FV"] < one.laws[0].sigma["FV"]
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign import campaign
 from fused_data import in_c, needs_compiler, own_cache
 from scipy.signal import decimate
 
@@ -57,6 +58,7 @@ def study(signals: Signals | None = None, rows: Rows | None = None, **settings: 
     return Study(signals=signals or Signals(median=1, lowpass=Lowpass(cutoff=20)), rows=rows or Rows(), cestac=chosen)
 
 
+@campaign  # by default: NumPy on this record (test_cestac_tx40), C on random robots below
 def test_one_run_on_the_tx40_record_is_the_plain_pipeline(tx40_data, tmp_path):
     """Low-pass, dense regressor, scipy's decimate column by column, lstsq: X to 1e-10 of the largest and each to 1e-9, residuals by joint."""
     model = in_c(load_robot("tx40"), tmp_path)
@@ -115,6 +117,7 @@ def test_columns_in_an_order_of_their_own_and_weights(planar):
         assert found.levels[0].runs[0].method == (NORMAL if settings.method == "ols" else TRIANGULAR)
 
 
+@campaign
 def test_workers_give_the_same_bits(planar):
     record = record_of(planar, 1500, 2)
     here, there = (cestac(planar, record, study(runs=5), workers=workers) for workers in (0, 2))

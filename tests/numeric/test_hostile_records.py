@@ -15,6 +15,7 @@ import zipfile
 import numpy as np
 import pytest
 from bag_files import KINDS, joint_states, write_bag
+from campaign import campaign
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import get_types_from_msg
@@ -26,7 +27,7 @@ from runtime.settings.study import study_from_mapping
 
 ALWAYS = 2**24  # bytes that any file may unpack to, here
 BEYOND = ALWAYS + 2**20
-BOMB = 600 * 2**20  # bytes, more than the process that reads a file may hold
+MEMORY, BOMB = 100 * 2**20, 200 * 2**20  # bytes that the process which reads a file may hold, here, and twice that
 N = 30
 STAMPS = np.arange(1, N + 1) * 5_000_000
 MESSAGES = {"/joint_states": joint_states(STAMPS, ("j1", "j2"), np.zeros((N, 2)), np.ones((N, 2)))}
@@ -34,12 +35,14 @@ MESSAGES = {"/joint_states": joint_states(STAMPS, ("j1", "j2"), np.zeros((N, 2))
 
 @pytest.fixture(autouse=True)
 def smaller(monkeypatch):
-    """The limit of 256 MiB takes seconds to reach."""
+    """The limits of 256 and 400 MiB and of 3 s take seconds to reach."""
     monkeypatch.setattr("runtime.files.ALWAYS", ALWAYS)
+    monkeypatch.setattr("runtime.records.formats.isolated.MEMORY", MEMORY)
+    monkeypatch.setattr("runtime.records.formats.isolated.SECONDS", 1)
 
 
 def refused(read, said, peak=60e6):
-    """`read` raises an InputError that says so, never holds `peak` bytes, and no process that it starts holds 700 MB."""
+    """`read` raises an InputError that says so, never holds `peak` bytes, and no process that it starts holds 400 MB."""
     tracemalloc.start()
     try:
         with pytest.raises(InputError, match=said):
@@ -47,7 +50,7 @@ def refused(read, said, peak=60e6):
         assert tracemalloc.get_traced_memory()[1] < peak
     finally:
         tracemalloc.stop()
-    assert 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 700e6
+    assert 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 400e6
 
 
 def record(path, **others):
@@ -293,6 +296,7 @@ def test_truncated_bags(tmp_path, whole):
             open_table(path)
 
 
+@campaign  # by default: tests/fuzz, formats bag, mcap, db3
 @settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_spoiled_bags(tmp_path, whole, data):

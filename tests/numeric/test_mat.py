@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
+from campaign import campaign
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -178,6 +179,7 @@ def test_without_h5py(tmp_path, monkeypatch):
         open_table(tmp_path / "a.mat")
 
 
+@campaign  # by default: tests/fuzz, format mat
 @settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_damaged_files_are_named(tmp_path, data):
