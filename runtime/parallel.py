@@ -31,6 +31,7 @@ R = TypeVar("R")
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "BLIS_NUM_THREADS")
 PATIENCE = 3  # times in a row that processes may die before any task is done
 TIMEOUT = 10.0  # s that a scheduler has to answer
+RESTART = 60.0  # s that its workers may take to come back after all of them died
 PACKAGES = ("symgen", "numpy", "scipy")  # whose versions decide the bits
 
 _worker: dict[str, Any] = {}  # of a spawned process: the task and its context
@@ -204,7 +205,8 @@ def _submitted(client: Any, task: Callable[[C, K], R], context: C, keys: list[K]
     from distributed import KilledWorker, as_completed
 
     with _answering(client.scheduler.address):
-        shared = client.scatter(context, broadcast=True, hash=False)
+        client.wait_for_workers(1, timeout=RESTART)
+        shared = client.scatter(context, broadcast=True, hash=False, timeout=RESTART)
         futures = {client.submit(_run_there, task, shared, key, pure=False): key for key in keys}
     for future, result in as_completed(list(futures), loop=client.loop, with_results=True, raise_errors=False):
         key = futures.pop(future)

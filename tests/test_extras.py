@@ -78,3 +78,11 @@ def test_a_file_names_the_extra_of_what_it_imports() -> None:
 
 def test_what_ci_tests_holds_every_extra() -> None:
     assert {name: listed - EXTRAS["test"] for name, listed in EXTRAS.items() if listed - EXTRAS["test"]} == {}
+
+
+def test_no_test_is_skipped_for_a_library_of_the_test_extra() -> None:
+    """Who installs it expects these tests to run: a library that is missing or broken fails them."""
+    asked = {
+        name for path in (ROOT / "tests").rglob("*.py") for name in re.findall(r'importorskip\("(\w+)"', path.read_text(encoding="utf-8"))
+    }
+    assert {name for name in asked if distributions(name) & EXTRAS["test"]} == set() and "torch" in asked

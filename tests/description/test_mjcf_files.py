@@ -17,8 +17,6 @@ from symgen.description.mjcf_text import reduced
 from symgen.description.xml_text import MAX_BYTES
 from symgen.errors import DescriptionError
 
-pytest.importorskip("mujoco")
-
 SMALL = """\
 <mujoco model="small">
 <worldbody>

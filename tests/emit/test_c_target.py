@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-import os
 import platform
 import shutil
 import subprocess
-import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -15,7 +13,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from campaign import sampled
+from campaign import campaign, sampled
 
 from symgen.cli.generate import emitted
 from symgen.description import load_robot, packaged_robots, parse_robot
@@ -87,7 +85,7 @@ def compare(library: ctypes.CDLL, module: ModuleType, samples: tuple[int, ...]) 
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", sampled(ROBOTS, 4, always=("emps_asymmetric", "haptic", "tx40")))
 def test_agrees_with_numpy(name: str, tmp_path: Path) -> None:
     """To 1e-12 of each column's maximum: the sums are the same, sines and cosines may differ by some units in the last place."""
     library = ctypes.CDLL(str(compiled(tmp_path, files(name)[f"{name}.c"], COMPILERS[0], SOON)))
@@ -95,7 +93,7 @@ def test_agrees_with_numpy(name: str, tmp_path: Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", sampled(ROBOTS, 0, always=("haptic", "tx40")))
+@pytest.mark.parametrize("name", sampled(ROBOTS, 0, always=("haptic",)))
 def test_agrees_as_users_compile_it(name: str, tmp_path: Path) -> None:
     library = ctypes.CDLL(str(compiled(tmp_path, files(name)[f"{name}.c"], COMPILERS[0], FAST)))
     compare(library, numpy_module(name, files(name)[f"{name}.py"]), (0, 1, 513, 1024))
@@ -103,7 +101,7 @@ def test_agrees_as_users_compile_it(name: str, tmp_path: Path) -> None:
 
 @needs_compiler
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("name", ["panda", "sr400"])
+@pytest.mark.parametrize("name", [pytest.param("panda", marks=campaign), "sr400"])
 def test_portable_path(name: str, compiler: str, tmp_path: Path) -> None:
     library = ctypes.CDLL(str(compiled(tmp_path, files(name)[f"{name}.c"], compiler, [*FAST, "-DPORTABLE"])))
     compare(library, numpy_module(name, files(name)[f"{name}.py"]), (1, 131))
@@ -173,7 +171,7 @@ int main(void)
 
 
 @needs_compiler
-@pytest.mark.parametrize("path", [[], ["-DPORTABLE"]], ids=["wide", "portable"])
+@pytest.mark.parametrize("path", [[], pytest.param(["-DPORTABLE"], marks=campaign)], ids=["wide", "portable"])
 def test_sanitizers(path: list[str], tmp_path: Path) -> None:
     module = numpy_module("scara", files("scara")["scara.py"])
     sizes = {"name": "scara", "n": len(module.JOINTS), "b": len(module.BASE_PARAMETERS)}
@@ -186,15 +184,6 @@ def test_sanitizers(path: list[str], tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=False)
     assert done.returncode == 0 and done.stderr == "", done.stderr
-
-
-def test_same_bytes_whatever_the_hash_seed() -> None:
-    code = "import hashlib\nfrom symgen.cli.generate import emitted\nprint(hashlib.sha256(emitted(['tx40'], ('c',))['tx40.c'].encode()).hexdigest())"
-    seen = {
-        subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env={**os.environ, "PYTHONHASHSEED": seed}).stdout
-        for seed in ("1", "77")
-    }
-    assert len(seen) == 1
 
 
 def test_quantities_have_the_names_of_the_numpy_module() -> None:

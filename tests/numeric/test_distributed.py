@@ -6,6 +6,7 @@ import socket
 import sys
 from pathlib import Path
 
+import distributed as dask
 import planar_2r_model as planar
 import pytest
 import typer
@@ -17,8 +18,6 @@ from runtime.parallel import results
 from runtime.resolution.cestac import cestac
 from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
 from symgen.cli.fleet import fleet
-
-dask = pytest.importorskip("distributed")
 
 RECORD = record(N=3000)
 STUDY = Study(signals=Signals(median=1, lowpass=Lowpass(cutoff=20)), cestac=CestacSettings(delta=(1e-3, 2e-3), runs=12, columns="all"))

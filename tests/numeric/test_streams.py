@@ -61,7 +61,8 @@ def write(kind, folder, samples):
         np.save(path, np.column_stack([t, q, tau]))
         columns = {"t": "1", "q": ["2", "3"], "tau": ["4", "5"]}
     elif kind == "parquet":
-        polars = pytest.importorskip("polars")
+        import polars
+
         polars.DataFrame({**named, "note": ["x"] * N}).write_parquet(path, row_group_size=300)
     return {"files": [path.name], "columns": columns}
 

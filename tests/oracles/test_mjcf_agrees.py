@@ -2,6 +2,7 @@
 
 import re
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -17,7 +18,6 @@ from symgen.description.robot import PRISMATIC
 
 from oracles.test_urdf_agrees import kept_frames, legend, loaded  # isort: skip
 
-mujoco = pytest.importorskip("mujoco")
 TOLERANCE = 1e-9  # of the largest torque of the sample
 
 
