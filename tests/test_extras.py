@@ -41,7 +41,7 @@ def optional_imports(path: Path) -> set[str]:
     nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
     names = {alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names}
     names |= {n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.module}
-    return {top for name in names if (top := name.partition(".")[0]) not in WITH_PYTHON and not distributions(top) & with_required(CORE)}
+    return {top for name in names if (top := name.partition(".")[0]) not in WITH_PYTHON and not distributions(top) & core()}
 
 
 @cache
@@ -53,9 +53,16 @@ def distributions(package: str) -> set[str]:
 installed = cache(packages_distributions)
 
 
+@cache
 def brought_by(extra: str) -> set[str]:
     """What installing an extra installs: its libraries, and what those require."""
     return with_required(EXTRAS[extra])
+
+
+@cache
+def core() -> set[str]:
+    """What a plain installation installs."""
+    return with_required(CORE)
 
 
 def with_required(listed: set[str]) -> set[str]:

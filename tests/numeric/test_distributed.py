@@ -23,8 +23,16 @@ RECORD = record(N=3000)
 STUDY = Study(signals=Signals(median=1, lowpass=Lowpass(cutoff=20)), cestac=CestacSettings(delta=(1e-3, 2e-3), runs=12, columns="all"))
 
 
+@pytest.fixture
+def cluster(processes):
+    """The cluster with both of its processes: what the test before has killed takes its time to come back on a busy machine."""
+    with dask.Client(processes) as client:
+        client.wait_for_workers(2, timeout=300)
+    return processes
+
+
 @pytest.fixture(scope="module")
-def cluster():
+def processes():
     """Two processes on this machine, nothing on the network."""
     with dask.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1") as local:
         with dask.Client(local) as client:
