@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import gcd, lcm
 
 from symgen.derive.graph import Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
@@ -67,6 +66,7 @@ class Expansion:
         self.algebra, self.ring = algebra, Ring(limit)
         self.parameters = {name: k for k, name in enumerate(parameters)}
         self._value: dict[int, Polynomial] = {}
+        self._written: dict[int, Monomial] = {}
         for node in algebra.graph.nodes:  # angles by which sums of products may be written shorter
             if node.index in algebra.angles and algebra.angles[node.index][0]:
                 turn, rest = algebra.angles[node.index]
@@ -138,9 +138,11 @@ class Expansion:
         return Expression({self._factors(m): Fraction(c) for m, c in sorted(a.items())})
 
     def _factors(self, monomial: int) -> Monomial:
-        atoms = self.ring.atoms
-        factors = sorted(self.ring.powers(monomial), key=lambda kn: (atoms[kn[0]].rank, str(atoms[kn[0]].base)))
-        return tuple((atoms[k].base, n * atoms[k].exponent) for k, n in factors)
+        if monomial not in self._written:
+            found = [(self.ring.atoms[k], n) for k, n in self.ring.powers(monomial).items()]
+            found.sort(key=lambda an: (an[0].rank, str(an[0].base)))
+            self._written[monomial] = tuple((atom.base, n * atom.exponent) for atom, n in found)
+        return self._written[monomial]
 
     def collected(self, a: Polynomial) -> ClosedForm:
         """A polynomial by parameter, written short."""
@@ -165,13 +167,13 @@ class Expansion:
         for angle in self.ring.angles.values():
             total = sum((Expression.symbol(f"q{j}") * n for j, n in angle.turn), angle.rest)
             for monomial in (angle.cos, angle.sin):
-                ((k, _),) = self.ring.powers(monomial)
+                (k,) = self.ring.powers(monomial)
                 if (name := self.ring.atoms[k].base) in used:
                     told[str(name)] = total
         return told
 
     def _in_order(self, key: int) -> list[tuple[Rank, int]]:
-        return sorted((self.ring.atoms[k].rank, n) for k, n in self.ring.powers(key))
+        return sorted((self.ring.atoms[k].rank, n) for k, n in self.ring.powers(key).items())
 
     def _group(self, coefficient: Polynomial, members: dict[int, int]) -> Group:
         first = next(iter(members.values()))
@@ -180,9 +182,9 @@ class Expansion:
         if len(inner) == 1:
             (only,) = inner
             return Group(parameters, only.common * first, only.inside)
-        common, content = _content(self.ring, coefficient)
+        common, content = self.ring.common(coefficient)
         sign = first * (1 if inner[0].common.ordered[0][1] > 0 else -1)
-        rest = self._factored({m - common: _whole(Fraction(sign * first * c) / content) for m, c in coefficient.items()})
+        rest = self._factored({m - common: _divided(sign * first * c, content) for m, c in coefficient.items()})
         return Group(parameters, self.expression({common: sign * content}), ONE, rest)
 
     def _factored(self, a: Polynomial) -> ClosedForm:
@@ -204,8 +206,8 @@ class Expansion:
         """common * inside, with the first term inside positive."""
         if len(a) == 1:
             return Group(ONE, self.expression(a))
-        common, content = _content(self.ring, a)
-        inside = self.expression({m - common: _whole(Fraction(c) / content) for m, c in a.items()})
+        common, content = self.ring.common(a)
+        inside = self.expression({m - common: _divided(c, content) for m, c in a.items()})
         sign = 1 if inside.ordered[0][1] > 0 else -1
         return Group(ONE, self.expression({common: sign * content}), inside if sign > 0 else -inside)
 
@@ -223,14 +225,10 @@ def _factors_of(group: Group) -> int:
     return sum(sum(abs(n) for _, n in m) + (abs(c) != 1) for e in (group.common, group.inside) for m, c in e.terms.items())
 
 
-def _content(ring: Ring, a: Polynomial) -> tuple[int, Coefficient]:
-    """The greatest monomial and the greatest positive number that divide every term."""
-    powers = [dict(ring.powers(m)) for m in a]
-    common = ring.monomial({k: min(p.get(k, 0) for p in powers) for k in powers[0]})
-    numbers = [Fraction(c) for c in a.values()]
-    return common, Fraction(gcd(*(c.numerator for c in numbers)), lcm(*(c.denominator for c in numbers)))
-
-
 def _whole(c: Fraction) -> Coefficient:
     """An int where it is one: several times faster."""
     return c.numerator if c.denominator == 1 else c
+
+
+def _divided(c: Coefficient, by: Coefficient) -> Coefficient:
+    return c // by if type(c) is int and type(by) is int and not c % by else _whole(Fraction(c) / by)

@@ -10,10 +10,11 @@ for the sums and differences that are angles of the model themselves: those of j
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations, product
+from math import gcd, lcm
 
 from symgen.derive.scalar import Turn
 from symgen.description.expression import Call, Expression, quarter_turns
@@ -65,6 +66,7 @@ class Ring:
         self.atoms: list[Atom] = []
         self.angles: dict[tuple[Turn, Expression], Angle] = {}
         self._index: dict[tuple[str | Call, int], int] = {}
+        self._powers: dict[int, dict[int, int]] = {}
         self._watched = 0  # bits that are set in no reduced monomial
         self._rules: list[Rule] | None = None
 
@@ -90,9 +92,29 @@ class Ring:
             self._rules = None
         return self.angles[key]
 
-    def powers(self, monomial: int) -> Iterator[tuple[int, int]]:
-        """(number of an atom, its power)."""
-        return ((k, n) for k, n in enumerate(monomial.to_bytes(len(self.atoms) + 1, "little")) if n)
+    def powers(self, monomial: int) -> dict[int, int]:
+        """{number of an atom: its power}."""
+        if monomial not in self._powers:
+            found, rest = {}, monomial
+            while rest:
+                k = ((rest & -rest).bit_length() - 1) // BITS
+                found[k] = (rest >> (BITS * k)) & ONES
+                rest &= ~(ONES << (BITS * k))
+            self._powers[monomial] = found
+        return self._powers[monomial]
+
+    def common(self, a: Polynomial) -> tuple[int, Coefficient]:
+        """The greatest monomial and the greatest positive number that divide every term."""
+        shared: dict[int, int] | None = None
+        for m in a:
+            powers = self.powers(m)
+            shared = dict(powers) if shared is None else {k: min(n, powers[k]) for k, n in shared.items() if k in powers}
+            if not shared:
+                break
+        if all(type(c) is int for c in a.values()):
+            return self.monomial(shared or {}), gcd(*a.values())  # type: ignore[arg-type]
+        numbers = [Fraction(c) for c in a.values()]
+        return self.monomial(shared or {}), Fraction(gcd(*(c.numerator for c in numbers)), lcm(*(c.denominator for c in numbers)))
 
     def monomial(self, powers: Mapping[int, int]) -> int:
         """The monomial with these powers, by number of the atom."""

@@ -180,7 +180,6 @@ class SymbolicRobot:
         from symgen.symbols.sympy_objects import of_model
 
         model = self.model("coriolis")
-        model.refuse_tied("C(q, qd)")
         return of_model(model if by == "christoffel" else replace(model, model=replace(model.model, name="coriolis by recursion")))
 
     def bias(self) -> Any:

@@ -117,11 +117,13 @@ class SymbolicModel:
         if name == "base_parameters":
             formulas: dict[Place, ClosedForm] = {(k,): of_formula(f) for k, f in enumerate(self.source.formulas.values())}
             return ClosedModel(formulas, None, {})
+        if self.model.letter == "C":
+            self.refuse_tied("C(q, qd)")
         d = Derivation(self.source)
         Frames(d.geometry).register_angles()
         if name == "determinant":
             expansion, polynomials = self._determinant(d)
-        elif name == "coriolis":
+        elif name == "coriolis" and not any(f"q{j}" in self.source.given for j in self.source.robot.joints):  # it differentiates by them
             expansion, polynomials = self._christoffel(d)
         elif name == "forward_dynamics":
             return self._direct(d)
@@ -146,7 +148,6 @@ class SymbolicModel:
     def _christoffel(self, d: Derivation) -> tuple[Expansion, dict[Place, Polynomial]]:
         """C_ij = sum_k 1/2 (dA_ij/dq_k + dA_ik/dq_j - dA_jk/dq_i) qd_k."""
         robot = self.source.robot
-        self.refuse_tied("C(q, qd)")
         expansion, A = self._expanded(d, MODELS["inertia_matrix"])
         ring, n = expansion.ring, len(robot.joints)
         derivative = {(place, k): ring.derivative(a, f"q{j}", j) for place, a in A.items() for k, j in enumerate(robot.joints)}
