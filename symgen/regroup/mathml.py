@@ -80,7 +80,12 @@ expression = PRINTER.expression
 
 def formula(f: Formula) -> list[MathML]:
     """The terms of a formula in the order of the text, one <math> each, from the second on with their sign."""
-    return [math(row([*_sign(added, not k), term])) for k, (added, term) in enumerate(PRINTER.terms(f))]
+    return signed_terms(PRINTER.terms(f))
+
+
+def signed_terms(terms: Sequence[Signed[MathML]]) -> list[MathML]:
+    """Terms, one <math> each, so that a browser may break the line between them."""
+    return [math(row([*_sign(added, not k), term])) for k, (added, term) in enumerate(terms)]
 
 
 def row(parts: Sequence[MathML]) -> MathML:

@@ -28,6 +28,7 @@ from symgen.regroup.mathml import MathML
 from symgen.regroup.regrouping import Regrouping
 from symgen.report.effects import Effect, effects
 from symgen.report.figure import figure, passive_text
+from symgen.symbols.markup import shown_models
 from symgen.version import VERSION
 
 SCRIPTS = ("kinematics.js", "drawing.js", "page.js")
@@ -63,6 +64,7 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
     robot, spec = regrouping.robot, module_spec(regrouping)
     drawing, parameters = figure(robot), effects(spec)
     certificate = certificate or certify(regrouping)
+    models, notes = shown_models(regrouping)
     style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS))
     return _template().render(
         robot=robot,
@@ -80,6 +82,8 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
         elements=[_element_row(e) for e in robot.elements],
         gravity=[mathml.math(mathml.expression(e)) for e in robot.gravity],
         formulas=_formulas(spec),
+        models=models,
+        model_notes=notes,
         places=_places(parameters),
         without=_without_effect(parameters),
         costs=[(name.replace("_", " "), function) for name, function in spec.functions.items()],

@@ -131,12 +131,13 @@ def source_of(
     gravity: str | None = None,
     values: Mapping[str, Any] | None = None,
     passive: str | None = None,
+    regrouping: Regrouping | None = None,
 ) -> Source:
-    """The robot with what was asked: see `symgen.symbolic`."""
+    """The robot with what was asked, see `symgen.symbolic`; `regrouping` is that of the robot where it is known already."""
     _one_of("parameters", parameters, PARAMETERS)
     formulas: dict[str, Formula]
     if parameters == "base":
-        regrouping: Regrouping = regroup(robot)
+        regrouping = regrouping or regroup(robot)
         own = {b.own: b.name for b in regrouping.base}
         formulas = {b.name: b.formula for b in regrouping.base}
     else:

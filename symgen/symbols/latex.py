@@ -17,10 +17,12 @@ from symgen.emit.printers import Text
 from symgen.regroup.latex import Latex
 from symgen.symbols.breaking import lines
 
-WIDTH = 92  # characters of a line as they are printed
+WIDTH = 76  # characters of a line as they are printed
 STATES = {"QP": r"\dot{q}", "QDP": r"\ddot{q}", "GAM": r"\Gamma", "th": r"\theta"}
+_WORD = re.compile(r"^([A-Za-z]{2,})(?=_|$)")  # several letters, one name
 HEADINGS = {"ant": "a(j)", "mu": r"\mu", "sigma": r"\sigma", "gamma": r"\gamma", "alpha": r"\alpha", "theta": r"\theta"}
 _INDEXED = re.compile(r"([A-Za-z]+?)(\d+(?:_\d+)*)")
+_ANGLE = re.compile(r"(C|S|th)(\d[\d_mx]*)(b*)")  # of a sum of angles: 23, 5m2 for q5 - q2; b with another constant
 _SPECIAL = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", **{c: "\\" + c for c in "&%$#_{}"}}
 
 
@@ -28,12 +30,13 @@ class ModelLatex(Latex):
     """Symbols of models; brackets that a line may be broken in."""
 
     def parameter(self, name: str) -> str:
+        if match := _ANGLE.fullmatch(name):
+            letter = STATES.get(match[1], match[1]) + "'" * len(match[3])
+            return f"{letter}_{{{match[2].replace('m', '-').replace('_', ',')}}}"
         match = _INDEXED.fullmatch(name)
-        if match and match[1] in STATES:
-            return f"{STATES[match[1]]}_{{{match[2].replace('_', ',')}}}"
-        if match and "_" in name:
-            return f"{match[1]}_{{{match[2].replace('_', ',')}}}"
-        return super().parameter(name)
+        if match and (match[1] in STATES or "_" in name):
+            return f"{STATES.get(match[1], match[1])}_{{{match[2].replace('_', ',')}}}"
+        return _WORD.sub(r"\\mathit{\1}", super().parameter(name))
 
     def call(self, function: str, argument: Expression, n: int) -> str:
         if function not in ("sign", "Abs"):
@@ -100,13 +103,7 @@ def broken(line: str) -> list[str]:
 
 def width(text: str) -> int:
     """Characters as they are printed, about."""
-    return len(
-        re.sub(
-            r"[{}^_&\\]",
-            "",
-            re.sub(r"\\(?:quad|operatorname|left|right|frac|,)", "", re.sub(r"\\(dot|ddot|Gamma|theta|sin|cos)", "x", text)),
-        )
-    )
+    return len(re.sub(r"\\(mathit|mathbf|operatorname|dot|ddot|left|right|frac|quad|,)|[{}^_&\\]", "", text))
 
 
 def escaped(text: str) -> str:
@@ -114,7 +111,7 @@ def escaped(text: str) -> str:
     return "".join(_SPECIAL.get(c, c) for c in text)
 
 
-def document(title: str, robot: Robot, notes: Sequence[str], body: str) -> str:
+def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body: str) -> str:
     """A document that compiles by itself: the frame table, the conventions, then `body`."""
     kept = informative_columns(robot)
     head = " & ".join(f"${HEADINGS.get(c, c)}$" for c in kept)
@@ -130,6 +127,7 @@ def document(title: str, robot: Robot, notes: Sequence[str], body: str) -> str:
             r"\setlength{\parindent}{0pt}\allowdisplaybreaks",
             r"\begin{document}",
             rf"\section*{{{escaped(title)}}}",
+            rf"{escaped(summary)}\par\medskip",
             r"Modified Denavit-Hartenberg (Khalil and Kleinfinger 1986); SI and rad.\par\medskip",
             rf"\begin{{tabular}}{{{'r' * len(kept)}}}",
             head + r" \\ \hline",

@@ -148,7 +148,11 @@ def angle_lines(angles: Mapping[str, Expression]) -> list[str]:
 
 def text(model: SymbolicModel, form: str) -> str:
     """Title, conventions, then a line per entry, or per equation of the recursion."""
-    head = [model.title, *notes(model), ""]
+    return "\n".join([model.title, model.summary, *notes(model), "", *text_lines(model, form)])
+
+
+def text_lines(model: SymbolicModel, form: str) -> list[str]:
+    """The angles and the entries of a closed form, or the equations of the recursion under their headings."""
     if form == "closed":
         closed = model.closed
         found = entries(model, PLAIN)
@@ -157,14 +161,15 @@ def text(model: SymbolicModel, form: str) -> str:
         width = max((len(label) for label, _ in found), default=0)
         body = [line for label, value in found for line in breaking.lines(f"{label:<{width}} = ", value, WIDTH, " " * (width + 3))]
         angles = angle_lines(closed.angles)
-        return "\n".join([*head, *angles, *([""] if angles else []), *(body or ["all entries are zero"])])
-    body, section = [], None
+        return [*angles, *([""] if angles else []), *(body or ["all entries are zero"])]
+    lines: list[str] = []
+    section = None
     for equation in model.listing.lines:
         if equation.section != section:
             section = equation.section
-            body += ["", section] if body else [section]
-        body += breaking.lines(f"  {equation.name} = ", equation.expression, WIDTH, "      ")
-    return "\n".join([*head, *body])
+            lines += ["", section] if lines else [section]
+        lines += breaking.lines(f"  {equation.name} = ", equation.expression, WIDTH, "      ")
+    return lines
 
 
 # --- LaTeX ---
@@ -218,9 +223,12 @@ def latex_fragment(model: SymbolicModel, form: str) -> str:
 
 def latex_document(model: SymbolicModel, form: str) -> str:
     """A document that compiles: frame table, conventions, formulas."""
-    parts = latex_lines(model, form) or [("Model", [r"\mathbf{0} &= 0"])]
-    body = "\n".join(rf"\subsection*{{{latex.escaped(title)}}}" + "\n" + latex.aligned(lines) for title, lines in parts)
-    return latex.document(model.title, model.source.robot, notes(model), body)
+    parts = latex_lines(model, form)
+    body = (
+        "\n".join(rf"\subsection*{{{latex.escaped(title)}}}" + "\n" + latex.aligned(lines) for title, lines in parts)
+        or "All entries are zero."
+    )
+    return latex.document(model.title, model.summary, model.source.robot, notes(model), body)
 
 
 # --- lines of SymPy ---

@@ -91,11 +91,16 @@ class SymbolicModel:
 
     @property
     def title(self) -> str:
-        """What is shown, of which robot."""
-        text = f"{self.source.robot.title or self.source.robot.name}: {self.model.name}, {self.model.summary}"
+        """Which model of which robot."""
+        return f"{self.source.robot.title or self.source.robot.name}: {self.model.name.replace('_', ' ')}"
+
+    @property
+    def summary(self) -> str:
+        """What the model is, its frames by their numbers."""
+        text = self.model.summary[0].upper() + self.model.summary[1:]
         if self.model.of_frames:
-            return text.replace("frame `of`", f"frame {self.request.of}").replace("frame `frame`", f"frame {self.request.frame}")
-        return text
+            text = text.replace("frame `of`", f"frame {self.request.of}").replace("frame `frame`", f"frame {self.request.frame}")
+        return f"{text}."
 
     # --- closed form ---
 
