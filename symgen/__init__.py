@@ -5,6 +5,7 @@
     symgen.certify(base).valid                        # exact rank and identities, independent dynamics, emitted module
     symgen.apply("results", "arm.urdf").write("new.urdf")  # identified values into the user's own URDF or MJCF
     symgen.symbolic("tx40").inertia_matrix()          # any model as SymPy objects
+    symgen.variants("arm.urdf")                       # the module with its table of frames as constants
 
 Names are loaded when they are first used.
 """
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from symgen.description import Robot, load_robot, packaged_robots, parse_robot
     from symgen.emit.certified import certify, model
     from symgen.emit.generate import generate_module
+    from symgen.emit.variants import variants
     from symgen.regroup.certificate import Certificate
     from symgen.regroup.regrouping import BaseParameter, Regrouping
     from symgen.regroup.regrouping import regroup as regrouping
@@ -42,6 +44,7 @@ __all__ = [
     "parse_robot",
     "regrouping",
     "symbolic",
+    "variants",
 ]
 
 _HOME = {
@@ -53,6 +56,7 @@ _HOME = {
     "generate_module": "symgen.emit.generate",
     "Applied": "symgen.update.applied",
     "apply": "symgen.update.apply",
+    "variants": "symgen.emit.variants",
 }
 
 

@@ -1,0 +1,212 @@
+"""One number that the study takes as known, fitted beside the model: a factor of a joint, its zero, a length, an angle, the direction of gravity.
+
+Around the fit chi of a physical robot, with A the weighted normal matrix, B the curvature of barrier and values, J = d(W chi)/d xi the effect of
+the number,
+
+    [A + B   W'J] [d chi]   [ 0  ]
+    [J'W     J'J] [d xi ] = [J'e ],      sigma_xi^2 = 1/(J'J - J'W (A + B)^-1 W'J),   gain = xi^2/(2 sigma_xi^2) nats,
+
+rows over their sigma. Only what this first step finds worth it is searched: fits of a physical robot at values of the number, by golden section.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from runtime.identification.plausibility.alternatives import Alternative
+from runtime.identification.plausibility.fits import MU, Grams, physical_fit, quick_fit, solved
+from runtime.identification.plausibility.trials import DECISIVE, Problem, Trial, moving
+from runtime.model.generated import joint_units
+
+Array = np.ndarray
+
+STEP = 1e-4
+"""Finite difference, rad, m, or relative."""
+WORTH = 0.4
+"""Gain of the first step over DECISIVE from which a number is searched."""
+SEARCHED = 5
+"""Numbers searched at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A number xi that is zero in the study as given.
+
+    Attributes
+    ----------
+    kind : str
+        factor, zero, length, angle.
+    change : function
+        xi to the Alternative.
+    span : float
+        Largest |xi| that is searched.
+    """
+
+    kind: str
+    change: Callable[[float], Alternative]
+    span: float
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """First step of one quantity: xi, its deviation, its gain in nats."""
+
+    xi: float
+    sigma: float
+    gain: float
+
+
+def quantities(problem: Problem) -> list[Quantity]:
+    """Factors of all joints, zeros of those that turn; lengths and angles of the table where it is free."""
+    return [*_factors(problem), *_zeros(problem), *(_entries(problem) if problem.variants is not None else ())]
+
+
+def _plain(problem: Problem) -> Alternative:
+    n = problem.samples.n
+    return Alternative("", "", "", np.eye(n), np.zeros(n), np.eye(n))
+
+
+def _factors(problem: Problem) -> Iterator[Quantity]:
+    """exp(xi) = the torque that the joint would need, over that of the record."""
+    plain, n = _plain(problem), problem.samples.n
+    for j, joint in enumerate(problem.model.JOINTS):
+        if n < 2 and not problem.barrier.near_values:
+            return
+
+        def change(xi: float, j: int = j, joint: int = joint) -> Alternative:
+            factor = float(np.exp(xi))
+            cause = f"the torque of joint {joint} is to be multiplied by {factor:.3g}"
+            remedy = f"look at ratio, torque constant and unit of joint {joint} ({_guess(factor)})"
+            return replace(plain, cause=cause, remedy=remedy, kind="factor", T=np.diag(np.where(np.arange(n) == j, factor, 1.0)))
+
+        yield Quantity("factor", change, 2.0)
+
+
+def _guess(factor: float) -> str:
+    """What a factor on a torque may be."""
+    for value, text in ((np.sqrt(2), "1.41: effective for peak values"), (np.sqrt(3), "1.73: phase for line values"), (2.0, "2: half of a pair of motors"), (9.81, "9.81: kp m for N m")):
+        for one in (value, 1 / value):
+            if abs(np.log(factor / one)) < 0.05:
+                return text
+    return "they are right when this factor is 1"
+
+
+def _zeros(problem: Problem) -> Iterator[Quantity]:
+    plain, n = _plain(problem), problem.samples.n
+    for j, joint in enumerate(problem.model.JOINTS):
+        if joint_units(problem.model)[j] != "rad":
+            continue
+
+        def change(xi: float, j: int = j, joint: int = joint) -> Alternative:
+            cause = f"the zero of joint {joint} is off by {np.degrees(xi):.3g} degrees"
+            remedy = f"look at theta of the frame of joint {joint}, at drives.offset and at the calibration of its encoder"
+            return replace(plain, cause=cause, remedy=remedy, kind="zero", p=np.where(np.arange(n) == j, xi, 0.0))
+
+        yield Quantity("zero", change, 1.2)
+
+
+def _entries(problem: Problem) -> Iterator[Quantity]:
+    """d, r, b relative to their size; alpha."""
+    assert problem.variants is not None
+    plain = _plain(problem)
+    for key, value in problem.variants.CONSTANTS.items():
+        name, frame = key[5:].rstrip("0123456789"), key.lstrip("abcdefghijklmnopqrstuvwxyz_")
+        if not key.startswith("free_") or name not in ("d", "r", "b", "alpha"):
+            continue
+        if name == "alpha":
+
+            def turned(xi: float, key: str = key, value: float = value, frame: str = frame) -> Alternative:
+                cause = f"alpha of frame {frame} is off by {np.degrees(xi):.3g} degrees"
+                remedy = f"look at alpha of frame {frame}: {value + xi:.3f} rad fits"
+                return replace(plain, cause=cause, remedy=remedy, kind="angle", constants={key: value + xi})
+
+            yield Quantity("angle", turned, 1.2)
+        elif value:
+
+            def longer(xi: float, key: str = key, value: float = value, frame: str = frame, name: str = name) -> Alternative:
+                length = value * float(np.exp(xi))
+                cause = f"{name} of frame {frame} is {length:.4g} m rather than {value:.4g} m"
+                remedy = f"measure {name} of frame {frame}: {length:.4g} m fits"
+                return replace(plain, cause=cause, remedy=remedy, kind="length", constants={key: length})
+
+            yield Quantity("length", longer, 1.0)
+
+
+def first_steps(problem: Problem, which: list[Quantity]) -> list[Step]:
+    """xi, sigma, gain of each quantity on its own, to first order."""
+    chi, sigma = problem.given.X, problem.given.sigma
+    plain = _plain(problem)
+    D, e, mask = _standard(problem, plain), None, moving(problem.samples.qd)
+    e = (plain.torque(problem.samples) - D @ chi) / sigma * mask
+    A, _ = Grams.of(D, plain.torque(problem.samples), mask).weighted(sigma)
+    _, B = problem.barrier.derivatives(chi, MU[-1])
+    H = A + B
+    share = problem.N / max(float(mask.sum(axis=0).mean()), 1.0)
+    steps = []
+    for quantity in which:
+        alternative = quantity.change(STEP)
+        if quantity.kind == "factor":
+            J = -(D @ chi) * (np.diag(alternative.T) > 1.0)  # (1 + xi) Y - W chi, its residuals over 1 + xi
+        else:
+            J = (_standard(problem, alternative) @ chi - D @ chi) / STEP
+        J = J / sigma * mask
+        WJ = np.einsum("kjp,kj->p", D, J / sigma)
+        left = float((J * J).sum() - WJ @ solved(H, WJ))
+        if left <= 1e-9 * float((J * J).sum()) or left <= 0:
+            steps.append(Step(0.0, np.inf, 0.0))
+            continue
+        xi = float((J * e).sum()) / left
+        steps.append(Step(xi, float((left * share) ** -0.5), 0.5 * share * xi**2 * left))
+    return steps
+
+
+def _standard(problem: Problem, alternative: Alternative) -> Array:
+    """Regressor over the standard parameters, shape (K, n, p)."""
+    q, qd, qdd = alternative.states(problem.samples)
+    with np.errstate(all="ignore"):
+        if alternative.on_data:
+            return np.asarray(problem.model.regressor(q, qd, qdd) @ problem.physical.K)
+        assert problem.variants is not None
+        return np.asarray(problem.variants.regressor(q, qd, qdd, **alternative.constants))
+
+
+def searched(problem: Problem) -> list[Trial]:
+    """The quantities whose first step is worth it, each at its best value."""
+    which = quantities(problem)
+    steps = first_steps(problem, which)
+    order = sorted(range(len(which)), key=lambda k: -steps[k].gain)[:SEARCHED]
+    trials = []
+    for k in order:
+        if steps[k].gain >= WORTH * DECISIVE:
+            trials.append(_best(problem, which[k], steps[k]))
+    return [trial for trial in trials if trial is not None]
+
+
+def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
+    def score(xi: float) -> float:
+        alternative = quantity.change(xi)
+        grams = problem.grams(alternative)
+        if grams is None:
+            return np.inf
+        volume = problem.N * float(np.linalg.slogdet(alternative.T)[1])
+        return quick_fit(problem.standard(grams), problem.barrier, problem.N, problem.free.sigma, problem.given.X).score - volume
+
+    near = float(np.clip(step.xi, -quantity.span, quantity.span))
+    grid = [near * f for f in (0.5, 1.0, 1.6)] + [-0.5 * quantity.span, 0.5 * quantity.span]
+    grid = sorted({float(np.clip(x, -quantity.span, quantity.span)) for x in grid})
+    best = min(grid, key=score)
+    width = max(abs(best) * 0.5, 2 * min(step.sigma, 0.25 * quantity.span))
+    found = minimize_scalar(score, bounds=(max(best - width, -quantity.span), min(best + width, quantity.span)), method="bounded", options={"maxiter": 12})
+    xi = float(found.x) if found.fun < score(best) else best
+    alternative = quantity.change(xi)
+    grams = problem.grams(alternative)
+    if grams is None:
+        return None
+    volume = problem.N * float(np.linalg.slogdet(alternative.T)[1])
+    fit = physical_fit(problem.standard(grams), problem.barrier, problem.N, problem.free.sigma, problem.given.X)
+    gain = problem.given.score - fit.score + volume - 0.5 * np.log(problem.N)  # one parameter more
+    return Trial(alternative, -np.inf, fit, float(gain))

@@ -1,0 +1,95 @@
+"""The values of the robot file against the record: gravity torque and inertia torque of every joint, ratio and sign.
+
+    Y_j = a_j (gravity torque by the values)_j + b_j (the rest of their torque)_j + friction and offset,
+
+least squares joint by joint: a_j = b_j = 1 where values, gear and sign are right. A part is left out where it is small or cannot be told apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from runtime.identification.plausibility.trials import Problem
+from runtime.model.inertia import INERTIAL
+
+Array = np.ndarray
+
+SMALL = 0.1
+"""Part of the torque, root mean square over that of the record, below which it has no ratio."""
+NEAR = (0.6, 1.6)
+"""Ratios that CAD values may have."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownValues:
+    """Torque of the values of the robot file beside that of the record.
+
+    Attributes
+    ----------
+    joints : tuple of str
+    gravity, inertia : ndarray, shape (n,)
+        Measured over computed; nan where the part is too small.
+    error : ndarray, shape (n,), %
+        Of the torque, with friction fitted and both ratios 1.
+    complete : bool
+        Whether every link has its ten values.
+    """
+
+    joints: tuple[str, ...]
+    gravity: Array
+    inertia: Array
+    error: Array
+    complete: bool
+
+    @property
+    def off(self) -> tuple[str, ...]:
+        """The ratios outside NEAR, in words."""
+        texts = []
+        for name, ratios in (("gravity", self.gravity), ("inertia", self.inertia)):
+            for joint, ratio in zip(self.joints, ratios, strict=True):
+                if np.isfinite(ratio) and not NEAR[0] <= ratio <= NEAR[1]:
+                    texts.append(f"{name} torque of joint {joint} {ratio:.2f} times that of the values")
+        return tuple(texts)
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        return dict(vars(self))
+
+
+def known_values(problem: Problem) -> KnownValues | None:
+    """The comparison; None where no link has all its values."""
+    physical, s = problem.physical, problem.samples
+    given = [all(f"{family}{j}" in physical.values for family in INERTIAL) for j in physical.links]
+    if not any(given):
+        return None
+    inertial = [k for j, known in zip(physical.links, given, strict=True) if known for k in physical.link(j)]
+    chi = np.zeros(len(physical.standard))
+    chi[inertial] = [physical.values[physical.standard[k]] for k in inertial]
+    for k, name in enumerate(physical.standard):
+        if name.startswith("Ia"):
+            chi[k] = physical.values.get(name, problem.given.X[k])
+    X = physical.K @ chi
+    at_rest = np.zeros_like(s.q)
+    gravity = problem.model.regressor(s.q, at_rest, at_rest) @ X
+    whole = problem.model.regressor(s.q, s.qd, s.qdd) @ X
+    Y, mask = s.tau - s.known, s.moving()
+    ratios, errors = np.full((s.n, 2), np.nan), np.full(s.n, np.nan)
+    for j in range(s.n):
+        rows = mask[:, j]
+        y = Y[rows, j]
+        if len(y) < 20:
+            continue
+        friction = np.column_stack([s.qd[rows, j], np.sign(s.qd[rows, j]), np.ones(len(y))])
+        parts = np.column_stack([gravity[rows, j], (whole - gravity)[rows, j]])
+        left = parts - friction @ np.linalg.lstsq(friction, parts, rcond=None)[0]
+        rest = y - friction @ np.linalg.lstsq(friction, y, rcond=None)[0]
+        size = np.linalg.norm(left, axis=0)
+        errors[j] = 100 * np.linalg.norm(rest - left.sum(axis=1)) / max(np.linalg.norm(y), 1e-300)
+        shown = size > SMALL * np.linalg.norm(y)
+        if shown.any() and (shown.sum() == 1 or abs(left[:, 0] @ left[:, 1]) < 0.9 * size.prod()):
+            ratios[j, shown] = np.linalg.lstsq(left[:, shown], rest, rcond=None)[0]
+    joints = tuple(str(j) for j in problem.model.JOINTS)
+    return KnownValues(joints, ratios[:, 0], ratios[:, 1], errors, all(given))

@@ -1,0 +1,316 @@
+"""What may be wrong with a record, a study or a robot file, found by computing: one call, one Check for each question.
+
+    before the fit   positions, speeds, accelerations, torques, lengths, values, rest
+    after it         physics alone, size, values of the robot file, direction of gravity, delay of each joint, alternatives
+
+The alternatives (`runtime.identification.plausibility.alternatives`) are tried where `variants` is given, or where something else is doubtful.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.identification.checklist import WORST, Check, State
+from runtime.identification.plausibility.before import REST, before_checks
+from runtime.identification.plausibility.continuous import searched
+from runtime.identification.plausibility.delay import CERTAIN, LONGEST, Delay, delay
+from runtime.identification.plausibility.gravity import Gravity, gravity_direction
+from runtime.identification.plausibility.known import KnownValues, known_values
+from runtime.identification.plausibility.samples import STANDING, Samples, samples_of
+from runtime.identification.plausibility.trials import DECISIVE, Problem, Trial, decisive, problem_of, tried
+from runtime.model.generated import GeneratedModel, joint_units
+from runtime.model.inertia import physical_model
+from runtime.observation.observation import observe
+from runtime.records.record import Record
+from runtime.records.stream import Stream
+from runtime.settings.study import EstimateSettings, Study
+from runtime.table import Table
+
+Array = np.ndarray
+
+GAP = 1.0
+"""Score of the best physical robot less that of free parameters, nats a row that counts, from which physics objects."""
+DENSITY = (0.3, 2e4)
+"""Mass of a robot over the cube of its reach, kg/m^3: outside, the torques have another unit or side."""
+LATE = 0.004
+"""Delay, s, from which it is told."""
+TILT = 15.0
+"""Angle of gravity, degrees, from which it is told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plausibility:
+    """Checks of a record, a study and a robot file.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    trials : tuple of Trial
+        Alternatives, the best first; empty where none were tried.
+    named : tuple of Trial
+        Those that explain the record decisively better.
+    equivalent : tuple of str
+        Changes that no fit of this record can tell from the study as given.
+    delay : Delay or None
+    gravity : Gravity or None
+    known : KnownValues or None
+    """
+
+    checks: tuple[Check, ...]
+    trials: tuple[Trial, ...] = ()
+    named: tuple[Trial, ...] = ()
+    equivalent: tuple[str, ...] = ()
+    delay: Delay | None = None
+    gravity: Gravity | None = None
+    known: KnownValues | None = None
+
+    @property
+    def worst(self) -> Check | None:
+        """The first finding that is not good."""
+        return next((check for state in WORST[:2] for check in self.checks if check.state == state), None)
+
+    @property
+    def line(self) -> str:
+        """The worst finding in one line; "" where there is none."""
+        return "" if self.worst is None else f"{self.worst.question} {self.worst.finding}. {_sentence(self.worst.remedy)}"
+
+    def __str__(self) -> str:
+        return self.to_text()
+
+    def to_text(self) -> str:
+        """Findings that are not good, then what was found besides."""
+        lines = [f"{c.state}: {c.question} {c.finding}. {_sentence(c.remedy)}" for c in self.checks if c.state in WORST[:2]]
+        lines += [f"no record can tell: {text}" for text in self.equivalent]
+        return "\n".join(lines or ["Record, study and robot file suit each other, as far as judged."])
+
+    def table(self) -> Table:
+        """The alternatives that come nearest, errors by joint in %."""
+        rows = [
+            (t.alternative.cause, f"{t.gain:+.0f}", *(f"{e:.1f}" for e in t.fit.errors)) for t in self.trials if t.fit is not None
+        ]
+        joints = len(self.trials[0].fit.errors) if self.trials and self.trials[0].fit is not None else 0
+        header = ("changed", "gain, nats", *(f"joint {j + 1} %" for j in range(joints)))
+        return Table("What would explain the record better (gain above 0), or as well", header, rows[:10], wide=(0,))
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "checks": [vars(check) for check in self.checks],
+            "named": [{"cause": t.alternative.cause, "remedy": t.alternative.remedy, "gain": t.gain} for t in self.named],
+            "equivalent": self.equivalent,
+            "delay": None if self.delay is None else self.delay.summary(),
+            "gravity": None if self.gravity is None else vars(self.gravity),
+            "known_values": None if self.known is None else self.known.summary(),
+        }
+
+
+def plausibility(
+    model: GeneratedModel,
+    records: Record | Stream | Sequence[Record | Stream],
+    study: Study | None = None,
+    *,
+    variants: GeneratedModel | None = None,
+    progress: Callable[[str], None] = lambda part: None,
+) -> Plausibility:
+    """Whether record, study and robot file suit each other, and what explains the record better where they do not.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    records : Record, Stream, or a sequence of them
+        Joint side, SI. Records that are read by blocks are not judged.
+    study : Study, optional
+        Default: Study().
+    variants : GeneratedModel, optional
+        The module of `symgen.variants`: alternatives are then tried in any case, those of the table of frames too.
+    progress : function of str
+        Called with the name of each part before it is computed.
+    """
+    study = study or Study()
+    several = list(records) if isinstance(records, Sequence) else [records]
+    whole = [record for record in several if isinstance(record, Record)]
+    if len(whole) < len(several):
+        return Plausibility((Check("Do record and robot file suit each other?", "open", "Not asked: the record is read by blocks", "", "set stream: off"),))
+    progress("plausibility of the record")
+    samples = samples_of(whole, study)
+    try:
+        physical = physical_model(model)
+    except InputError:
+        physical = None
+    checks = [*before_checks(model, samples, physical), rest(model, whole, study, samples)]
+    enough = int(samples.moving().sum()) > 2 * len(model.BASE_PARAMETERS)
+    if physical is None or not enough:
+        reason = "too few samples at which the joints move" if not enough else "the model has no standard parameters"
+        return Plausibility((*checks, Check("Does physics agree?", "open", f"Not asked: {reason}")))
+    problem = problem_of(model, samples, variants)
+    known = known_values(problem) if problem.barrier.near_values else None
+    alone = problem_of(model, samples, variants, values=False) if known is not None else problem
+    gravity = gravity_direction(problem)
+    late = delays(model, whole, study)
+    checks += [physics(model, alone), size(model, alone), *([] if late is None else [delayed(late)])]
+    checks += [] if known is None else [values(known)]
+    trials: list[Trial] = []
+    if variants is not None or any(check.state in WORST[:2] for check in checks):
+        progress("what would explain the record better")
+        sides = study.record[0].sides if study.record else ("joint", "joint")
+        trials = _ranked([*tried(problem, sides), *searched(problem)])
+    named = decisive(trials)
+    checks += [] if gravity is None else [direction(gravity, named)]
+    checks += [better(problem, named, tried=bool(trials))] if trials else []
+    return Plausibility(tuple(checks), tuple(t for t in trials if t.fit is not None)[:10], tuple(named), _equivalent(problem), late, gravity, known)
+
+
+def _ranked(trials: Sequence[Trial]) -> list[Trial]:
+    """The best first; of the sampling rates one alone."""
+    ordered, kept = sorted(trials, key=lambda trial: -trial.gain), []
+    for trial in ordered:
+        if not (trial.alternative.kind == "rate" and any(k.alternative.kind == "rate" and k.fit is not None for k in kept)):
+            kept.append(trial)
+    return kept
+
+
+def rest(model: GeneratedModel, records: Sequence[Record], study: Study, samples: Samples) -> Check:
+    """Share of the instants at which a joint stands, and what leaving them out changes."""
+    question = "Do the joints move while they are used?"
+    limit = f"standing at most {100 * REST:g} % of the rows that are used"
+    low = np.broadcast_to(np.asarray(study.rows.low_speed, dtype=float), (samples.n,))
+    speed = np.abs(samples.qd)
+    used = speed >= low
+    standing = used & (speed <= samples.standing())
+    share = standing.sum(axis=0) / np.maximum(used.sum(axis=0), 1)
+    worst = int(np.argmax(share))
+    text = f"Joint {model.JOINTS[worst]} stands in {100 * share[worst]:.0f} % of its rows"
+    if share[worst] <= REST:
+        return Check(question, "good", text, limit)
+    units = joint_units(model)
+    wanted = tuple(float(f"{max(v, x):.1g}") for v, x in zip(samples.standing(), low, strict=True))
+    proposed: float | tuple[float, ...] = max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
+    remedy = f"set rows.low_speed: {list(proposed) if isinstance(proposed, tuple) else proposed} ({units[worst]}/s), or cut the record (rows.window)"
+    errors = []
+    for rows in (study.rows, replace(study.rows, low_speed=proposed)):
+        try:
+            errors.append(_error(model, records, replace(study, rows=rows)))
+        except InputError:
+            return Check(question, "doubtful", text, limit, remedy)
+    text += f"; without these rows the fit leaves {errors[1]:.1f} % in place of {errors[0]:.1f} %"
+    return Check(question, "doubtful" if errors[1] < 0.8 * errors[0] else "good", text, limit, remedy)
+
+
+def _error(model: GeneratedModel, records: Sequence[Record], study: Study) -> float:
+    """Relative error of ordinary least squares, %."""
+    from runtime.estimators.methods import estimate_of
+
+    return estimate_of(observe(model, records, study), EstimateSettings(), model=model).relative_error
+
+
+def physics(model: GeneratedModel, problem: Problem) -> Check:
+    """Errors by joint of the best physical robot beside those of free parameters."""
+    free, given = problem.free, problem.given
+    gap = (given.score - given.penalty - free.score) / problem.N
+    ratio = given.errors / np.maximum(free.errors, 0.3)
+    j = int(np.argmax(ratio))
+    text = f"A physical robot leaves {given.errors[j]:.1f} % of the torque of joint {model.JOINTS[j]}, free parameters {free.errors[j]:.1f} %"
+    limit = "about the same error"
+    remedy = "a sign, an axis, a length or the order of the columns is wrong: look at the alternatives below"
+    return Check("Can a physical robot explain the record?", "good" if gap < GAP else "doubtful", text, limit, remedy)
+
+
+def size(model: GeneratedModel, problem: Problem) -> Check:
+    """Mass that the torques ask for, against the reach of the robot."""
+    from runtime.identification.plausibility.trials import FARTHEST, reach
+
+    question, limit = "Do the torques suit the size of the robot?", f"{DENSITY[0]:g} to {DENSITY[1]:g} kg per cubic metre of reach"
+    length = reach(model)
+    physical = problem.physical
+    masses = sum(problem.given.X[physical.link(j)[-1]] for j in physical.links)
+    if not physical.links or length > FARTHEST or length <= 0.1:
+        return Check(question, "open", "Not asked: the reach of the robot file is not known", limit)
+    density = masses / length**3
+    text = f"They ask for a robot of about {masses:.2g} kg with a reach of {length:.2g} m"
+    state: State = "good" if DENSITY[0] <= density <= DENSITY[1] else "doubtful"
+    remedy = "look at side, unit and gear of the torques (record.torque_side, units.tau, drives.ratio, torque_constant)"
+    return Check(question, state, text, limit, remedy)
+
+
+def values(known: KnownValues) -> Check:
+    """The values of the robot file, by joint."""
+    question = "Do the values of the robot file agree with the record?"
+    limit = "gravity and inertia torques 0.6 to 1.6 times those of the values"
+    remedy = (
+        "look at ratio, torque constant and sign of that joint, at the load, and at what the model leaves out: a counterbalance or a cable is "
+        "subtracted as record.columns.tau_known; or the values are those of another robot"
+    )
+    ratios = [x for x in (*known.gravity, *known.inertia) if np.isfinite(x)]
+    text = f"Ratios of gravity and inertia torques from {min(ratios):.2f} to {max(ratios):.2f}" if ratios else "Too small beside friction to tell"
+    off = known.off
+    state: State = "good" if not off else "doubtful"
+    return Check(question, state, f"No: {'; '.join(off[:4])}" if off else text, limit, remedy)
+
+
+def delays(model: GeneratedModel, records: Sequence[Record], study: Study) -> Delay | None:
+    """Delay of the longest record; None where it is too short."""
+    record = max(records, key=len)
+    duration = float(record.t[-1] - record.t[0])
+    try:
+        return delay(model, record, study, longest=min(LONGEST, duration / 20))
+    except (InputError, ValueError):
+        return None
+
+
+def delayed(late: Delay) -> Check:
+    """Time shift between positions and torques."""
+    question, limit = "Do positions and torques belong to the same instants?", f"shift below {1e3 * LATE:g} ms"
+    known = np.isfinite(late.sigma)
+    if not known.any():
+        return Check(question, "open", "The record does not tell", limit)
+    certain = np.isfinite(late.common) and abs(late.common) > max(CERTAIN * late.sigma_common, LATE)
+    text = f"Torques are {'late' if late.common > 0 else 'early'} by {1e3 * abs(late.common):.1f} ms, deviation {1e3 * late.sigma_common:.1f} ms"
+    j = int(np.nanargmax(late.before - late.after))
+    text += f"; correcting it changes the error of joint {late.joints[j]} from {late.before[j]:.1f} to {late.after[j]:.1f} %"
+    remedy = f"shift the torques by {-1e3 * late.common:+.1f} ms against the positions before reading the record, or mend the logger"
+    worth = certain and late.before[j] > 1.1 * late.after[j]
+    return Check(question, "doubtful" if worth else "good", text, limit, remedy)
+
+
+def direction(gravity: Gravity, named: Sequence[Trial]) -> Check:
+    """Direction of gravity fitted freely; what another alternative explains better is not told twice."""
+    question, limit = "Does gravity point where the robot file says?", f"within {TILT:g} degrees"
+    off = gravity.angle > max(TILT, CERTAIN * gravity.sigma) and gravity.gain > DECISIVE
+    first = not named or gravity.gain >= 0.9 * named[0].gain
+    state: State = "good" if not off else "doubtful" if first else "open"
+    remedy = "look at gravity in the robot file, at alpha and theta of the first frames, and at how the robot is mounted"
+    return Check(question, state, f"Fitted freely it is {gravity.text}", limit, remedy)
+
+
+def better(problem: Problem, named: Sequence[Trial], *, tried: bool) -> Check:
+    """The alternatives that explain the record decisively better."""
+    question, limit = "Is the study the best explanation of the record?", f"no single change gains {DECISIVE:g} nats"
+    if not named:
+        return Check(question, "good", "No single change of signs, columns, units, angles or lengths explains it better", limit)
+    best = named[0]
+    assert best.fit is not None
+    j = int(np.argmax(problem.given.errors / np.maximum(best.fit.errors, 0.3)))
+    causes = [t.alternative.cause for t in named]
+    text = f"No: {causes[0]}" + (f" (or: {'; '.join(causes[1:])})" if causes[1:] else "")
+    text += f"; the error of joint {problem.model.JOINTS[j]} goes from {problem.given.errors[j]:.1f} to {best.fit.errors[j]:.1f} %"
+    return Check(question, "no", text, limit, best.alternative.remedy)
+
+
+def _equivalent(problem: Problem) -> tuple[str, ...]:
+    """What leaves the span of W as it is."""
+    texts = []
+    if not problem.barrier.near_values:
+        texts.append("a common factor of all torques (no values in the robot file to compare with)")
+    return tuple(texts)
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+__all__ = ["STANDING", "Plausibility", "plausibility"]
