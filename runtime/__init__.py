@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from runtime.estimators.methods import estimate
     from runtime.excitation.search import excite
     from runtime.identification.identification import Identification, identify
+    from runtime.identification.plausibility.delay import delay
+    from runtime.identification.plausibility.plausibility import plausibility
     from runtime.model.generated import load_model
     from runtime.motion.simulation import simulate
     from runtime.observation.observation import Observation, observe
@@ -44,6 +46,7 @@ __all__ = [
     "Study",
     "advise",
     "cestac",
+    "delay",
     "essential",
     "estimate",
     "excite",
@@ -51,6 +54,7 @@ __all__ = [
     "load_model",
     "load_study",
     "observe",
+    "plausibility",
     "read_record",
     "report",
     "simulate",
@@ -63,6 +67,8 @@ _MODULES = {
     "runtime.estimators.methods": ("estimate",),
     "runtime.excitation.search": ("excite",),
     "runtime.identification.identification": ("Identification", "identify"),
+    "runtime.identification.plausibility.delay": ("delay",),
+    "runtime.identification.plausibility.plausibility": ("plausibility",),
     "runtime.model.generated": ("load_model",),
     "runtime.motion.simulation": ("simulate",),
     "runtime.observation.observation": ("Observation", "observe"),

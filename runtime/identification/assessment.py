@@ -28,6 +28,7 @@ def assess(
     *,
     encoder: Sequence[float] = (),
     simulator: LoopSimulator | None = None,
+    variants: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda part: None,
 ) -> Identification:
@@ -35,7 +36,7 @@ def assess(
 
     Parameters
     ----------
-    model, records, study, simulator, provenance : as for `identify`
+    model, records, study, simulator, variants, provenance : as for `identify`
     encoder : sequence of float
         Steps of the encoders in use, rad or m; judged like every other check.
     progress : function of str
@@ -47,7 +48,9 @@ def assess(
         `missing` holds the parts that cannot be computed, each with its reason.
     """
     progress("identification")
-    result = identify(model, records, study, simulator=simulator, provenance=provenance)
+    result = identify(
+        model, records, study, simulator=simulator, variants=variants, plausible=True, provenance=provenance, progress=progress
+    )
     if not result.determined:
         reason = "friction, physical consistency, encoder resolution: the record does not determine the parameters"
         return replace(result, missing=(reason,))

@@ -142,6 +142,7 @@ def checklist_of(
     negative: Sequence[str] = (),
     feasibility: Feasibility | None = None,
     advice: Advice | None = None,
+    plausible: Sequence[Check] = (),
 ) -> Checklist:
     """The checklist of an identification; rank alone where the record does not determine the parameters.
 
@@ -163,8 +164,10 @@ def checklist_of(
         Whether a physical robot can have the parameters.
     advice : Advice, optional
         The coarsest encoders, and the step in use.
+    plausible : sequence of Check
+        Whether record, study and robot file suit each other: what is wrong there is the cause of what follows.
     """
-    checks = [determined(estimate, fit)]
+    checks = [determined(estimate, fit), *plausible]
     if estimate.status != "rank-deficient":
         checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error)]
         checks += [signs(negative), certain(fit, bootstrap), separate(fit), physical(estimate, feasibility), resolved(advice)]

@@ -7,7 +7,7 @@ model, records, study -> Y = W X + rho -> all parameters, eqs. (7)-(11), and the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from runtime.estimators.methods import observed as method_observation
 from runtime.identification.coupling import coupling_fits
 from runtime.identification.friction import friction_curves
 from runtime.identification.payload_study import payload_study
+from runtime.identification.plausibility.plausibility import plausibility
 from runtime.identification.result import Identification
 from runtime.identification.uncertainty import uncertainty
 from runtime.identification.validation import cross_validation, direct_comparison, split_validation, weak_directions
@@ -47,7 +48,10 @@ def identify(
     simulator: LoopSimulator | None = None,
     physical: bool = False,
     friction: bool = False,
+    variants: GeneratedModel | None = None,
+    plausible: bool | None = None,
     provenance: Mapping[str, Any] | None = None,
+    progress: Callable[[str], None] = lambda part: None,
 ) -> Identification:
     """Parameters of a robot from its records, and how far to trust them.
 
@@ -67,8 +71,14 @@ def identify(
         Whether a physical robot can have the parameters.
     friction : bool
         Curves of friction against velocity, joint by joint.
+    variants : GeneratedModel, optional
+        The module of `symgen.variants`: other tables of frames and directions of gravity are tried on the records.
+    plausible : bool, optional
+        Whether record, study and robot file suit each other (`runtime.plausibility`); default: where `variants` is given.
     provenance : mapping, optional
         What else reproduces the result; names of the records, hashes and versions are added.
+    progress : function of str
+        Called with the name of each part that takes its time.
 
     Returns
     -------
@@ -117,6 +127,9 @@ def identify(
         payload=None if study.payload is None else payload_study(model, whole, study, provenance=origin(records)),
         feasibility=feasibility_of(result) if physical and not result.feasible else None,
         friction=friction_curves(model, whole, study, fit) if friction else (),
+        plausibility=plausibility(model, records, study, variants=variants, progress=progress)
+        if (variants is not None if plausible is None else plausible)
+        else None,
     )
 
 

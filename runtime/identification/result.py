@@ -15,6 +15,7 @@ from runtime.estimators.physical import negative_elements
 from runtime.identification.checklist import Checklist, checklist_of, lost_joints
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.payload_study import PayloadStudy
+from runtime.identification.plausibility.plausibility import Plausibility
 from runtime.identification.record_errors import RecordError, record_errors
 from runtime.identification.uncertainty import Uncertainty
 from runtime.identification.validation import Comparison, CrossValidation, WeakDirections
@@ -71,6 +72,8 @@ class Identification:
         The coarsest encoders.
     resolution : Cestac or None
         The resolution study at the steps of study.cestac.
+    plausibility : Plausibility or None
+        Whether record, study and robot file suit each other; None where it was not asked for.
     missing : tuple of str
         Parts that were asked for and could not be done, each with its reason.
     """
@@ -91,6 +94,7 @@ class Identification:
     friction: tuple[FrictionCurve, ...] = ()
     advice: Advice | None = None
     resolution: Cestac | None = None
+    plausibility: Plausibility | None = None
     missing: tuple[str, ...] = ()
 
     @property
@@ -179,6 +183,7 @@ class Identification:
             negative=self.negative if self.determined else (),
             feasibility=self.feasibility,
             advice=self.advice,
+            plausible=self.plausibility.checks if self.plausibility is not None else (),
         )
 
     @property
@@ -230,7 +235,8 @@ class Identification:
         parts += [curve.to_table() for curve in self.friction]
         parts += [] if self.advice is None else [self.advice.verdict]
         parts += [] if self.resolution is None else [self.resolution.to_table()]
-        return "\n\n".join(part for part in (*parts, *self.missing, self.verdict) if part)
+        worst = self.plausibility.line if self.plausibility is not None else ""
+        return "\n\n".join(part for part in (*parts, *self.missing, worst, self.verdict) if part)
 
     def eigenvalue_table(self) -> Table:
         """Conditions of a physical robot with the smallest eigenvalue of each, of an estimate that was made under them."""
@@ -284,6 +290,8 @@ class Identification:
             summary["feasibility"] = {"feasible": self.feasibility.feasible, "margin": self.feasibility.margin, "blocking": blocking}
         if self.payload is not None:
             summary |= self.payload.summary()
+        if self.plausibility is not None:
+            summary["plausibility"] = self.plausibility.summary()
         return {**summary, **({"friction": [curve.summary() for curve in self.friction]} if self.friction else {})}
 
 

@@ -104,6 +104,8 @@ class IdentificationDocument(Estimate):
         Torque constants of the drives, from the load.
     friction : tuple of mapping
         Friction against velocity, one curve per joint.
+    plausibility : mapping
+        Whether record, study and robot file suit each other.
     """
 
     essential: EssentialDocument
@@ -119,6 +121,7 @@ class IdentificationDocument(Estimate):
     payload_difference: dict[str, Any] | None
     drive_gains: dict[str, Any] | None
     friction: tuple[dict[str, Any], ...]
+    plausibility: dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -9,7 +9,19 @@ from typing import Annotated
 import typer
 
 from runtime.result_files import reserved
-from symgen.cli.session import NEGATIVE, RECORDS, ROBOT, model_of, reported_errors, show, simulator_of, single_thread, study_of_arguments
+from symgen.cli.session import (
+    NEGATIVE,
+    RECORDS,
+    ROBOT,
+    model_of,
+    reported_errors,
+    say,
+    show,
+    simulator_of,
+    single_thread,
+    study_of_arguments,
+    variants_of,
+)
 
 
 def identify(
@@ -30,6 +42,9 @@ def identify(
     friction: Annotated[
         bool, typer.Option("--friction", help="Friction against velocity, joint by joint, and the law it follows.")
     ] = False,
+    plausible: Annotated[
+        bool, typer.Option("--plausible/--no-plausible", help="Tell whether record, study and robot file suit each other, and what would.")
+    ] = True,
     json: Annotated[bool, typer.Option("--json", help="Print estimate.json instead of tables.")] = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code 1 where the record does not determine them."""
@@ -46,7 +61,18 @@ def identify(
         records = records_or_streams(study.record, model, study.stream)
         computed = {"target": target_of(model), "processor": processor()}
         simulator = simulator_of(robot, model, study)
-        result = runtime.identify(model, records, study, simulator=simulator, physical=physical, friction=friction, provenance=computed)
+        result = runtime.identify(
+            model,
+            records,
+            study,
+            simulator=simulator,
+            physical=physical,
+            friction=friction,
+            variants=variants_of(robot) if plausible else None,
+            plausible=plausible,
+            provenance=computed,
+            progress=say,
+        )
         if results is not None:
             runtime.report(result, results)
         show(result.to_json() if json else result.to_text(), output, json=json)

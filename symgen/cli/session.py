@@ -97,6 +97,16 @@ def model_of(robot: str, target: str = "numpy") -> GeneratedModel:
     return model if target == "numpy" else _in_c(model, robot)
 
 
+def variants_of(robot: str) -> GeneratedModel | None:
+    """The module of a ROBOT argument with its table of frames free; None of a generated module, which has no robot file."""
+    if Path(robot).suffix == ".py":
+        return None
+    import symgen
+    from runtime.model.generated import load_model
+
+    return load_model(symgen.variants(robot))
+
+
 def model_of_job(robot: str) -> GeneratedModel:
     """The model of a job of a fleet: what is wrong with its robot file is an error of that job alone."""
     from runtime.errors import InputError

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from symgen.description.expression import ONE, Expression
 from symgen.description.files import load_robot
@@ -55,7 +56,7 @@ def freed(robot: Robot) -> Robot:
         return Expression.symbol(f"{FREE}{name}")
 
     def free(f: Frame) -> Frame:
-        entries = {key: symbol(f"{key}{f.j}", getattr(f, key)) for key in ("gamma", "b") if getattr(f, key)}
+        entries: dict[str, Any] = {key: symbol(f"{key}{f.j}", getattr(f, key)) for key in ("gamma", "b") if getattr(f, key)}
         entries |= {"alpha": symbol(f"alpha{f.j}", f.alpha), "d": symbol(f"d{f.j}", f.d)}
         q = Expression.symbol(f.q)
         theta, r = symbol(f"theta{f.j}", f.theta0), symbol(f"r{f.j}", f.r0)

@@ -74,7 +74,9 @@ class Alternative:
         return not self.constants
 
 
-def alternatives(model: GeneratedModel, variants: GeneratedModel | None = None, sides: Sequence[str] = ("joint", "joint")) -> list[Alternative]:
+def alternatives(
+    model: GeneratedModel, variants: GeneratedModel | None = None, sides: Sequence[str] = ("joint", "joint")
+) -> list[Alternative]:
     """All that can be tried on a robot.
 
     Parameters
@@ -111,9 +113,25 @@ def signs(make: _Maker) -> Iterator[Alternative]:
     """Positions, torques, or both of one joint with the other sign; of all joints."""
     for j, joint in enumerate(make.joints):
         S = np.diag(np.where(np.arange(make.n) == j, -1.0, 1.0))
-        yield make("sign", f"the torque of joint {joint} has the wrong sign", f"turn the sign of the torque of joint {joint}: ratio, torque constant or column", T=S)
-        yield make("sign", f"the position of joint {joint} has the wrong sign", f"turn the sign of the position of joint {joint}, or its axis in the robot file", P=S)
-        yield make("sign", f"joint {joint} counts in the other sense, position and torque", f"turn the sign of the ratio of joint {joint}, or alpha and theta of its frame", P=S, T=S)
+        yield make(
+            "sign",
+            f"the torque of joint {joint} has the wrong sign",
+            f"turn the sign of the torque of joint {joint}: ratio, torque constant or column",
+            T=S,
+        )
+        yield make(
+            "sign",
+            f"the position of joint {joint} has the wrong sign",
+            f"turn the sign of the position of joint {joint}, or its axis in the robot file",
+            P=S,
+        )
+        yield make(
+            "sign",
+            f"joint {joint} counts in the other sense, position and torque",
+            f"turn the sign of the ratio of joint {joint}, or alpha and theta of its frame",
+            P=S,
+            T=S,
+        )
     if make.n > 1:
         yield make("sign", "all torques have the wrong sign", "turn the sign of the torques", T=-make.one)
         yield make("sign", "all positions have the wrong sign", "turn the sign of the positions", P=-make.one)
@@ -128,12 +146,16 @@ def exchanges(make: _Maker) -> Iterator[Alternative]:
         orders.append((order, "exchange", f"of joints {make.joints[i]} and {make.joints[k]} are exchanged"))
     if make.n > 2:
         orders.append((list(range(make.n))[::-1], "order", "come in reverse order"))
-        orders += [(list(np.roll(np.arange(make.n), by)), "order", f"are moved by one joint {way}") for by, way in ((1, "back"), (-1, "on"))]
+        orders += [
+            (list(np.roll(np.arange(make.n), by)), "order", f"are moved by one joint {way}") for by, way in ((1, "back"), (-1, "on"))
+        ]
     for order, kind, text in orders:
         E = make.one[order]
         yield make(kind, f"the position columns {text}", "name the position columns in the order of the joints (record.columns.q)", P=E)
         yield make(kind, f"the torque columns {text}", "name the torque columns in the order of the joints (record.columns.tau)", T=E)
-        yield make(kind, f"the columns of positions and torques {text}", "name the columns in the order of the joints (record.columns)", P=E, T=E)
+        yield make(
+            kind, f"the columns of positions and torques {text}", "name the columns in the order of the joints (record.columns)", P=E, T=E
+        )
 
 
 def units(make: _Maker) -> Iterator[Alternative]:
@@ -151,14 +173,24 @@ def units(make: _Maker) -> Iterator[Alternative]:
             if which.sum() > 1:
                 for j in np.flatnonzero(which):
                     P = np.diag(np.where(np.arange(make.n) == j, factor, 1.0))
-                    yield make("unit", f"position of joint {make.joints[j]}: {of}", f"set the unit of joint {make.joints[j]} in record.units.q: {unit}", P=P)
+                    yield make(
+                        "unit",
+                        f"position of joint {make.joints[j]}: {of}",
+                        f"set the unit of joint {make.joints[j]} in record.units.q: {unit}",
+                        P=P,
+                    )
 
 
 def rates(make: _Maker) -> Iterator[Alternative]:
     """Another sampling rate, by the factors of RATES."""
     for factor in RATES:
         text = f"{factor:g} times" if factor > 1 else f"1/{1 / factor:g} of"
-        yield make("rate", f"the sampling rate is {text} the stated one", "correct record.rate, or the unit of the time column (record.units.t)", rate=factor)
+        yield make(
+            "rate",
+            f"the sampling rate is {text} the stated one",
+            "correct record.rate, or the unit of the time column (record.units.t)",
+            rate=factor,
+        )
 
 
 def couplings(make: _Maker) -> Iterator[Alternative]:
@@ -172,9 +204,17 @@ def couplings(make: _Maker) -> Iterator[Alternative]:
             P[k, i], T[i, k] = s, -s  # tau' qd' = tau qd
             sign = "plus" if s > 0 else "minus"
             remedy = f"give the coupling of joints {a} and {b} as an off-diagonal element of drives.ratio"
-            yield make("coupling", f"the coupling of joints {a} and {b} is missing: position {b} is to be taken {sign} position {a}", remedy, P=P, T=T)
+            yield make(
+                "coupling",
+                f"the coupling of joints {a} and {b} is missing: position {b} is to be taken {sign} position {a}",
+                remedy,
+                P=P,
+                T=T,
+            )
             yield make("coupling", f"the coupling of joints {a} and {b} is missing in the positions ({sign})", remedy, P=P)
-            yield make("coupling", f"the coupling of joints {a} and {b} is missing in the torques ({'minus' if s > 0 else 'plus'})", remedy, T=T)
+            yield make(
+                "coupling", f"the coupling of joints {a} and {b} is missing in the torques ({'minus' if s > 0 else 'plus'})", remedy, T=T
+            )
 
 
 def zeros(make: _Maker) -> Iterator[Alternative]:
@@ -194,19 +234,58 @@ def transmissions(make: _Maker, drives: Drives, sides: Sequence[str]) -> Iterato
     inverse = np.linalg.inv(R)
     shift = drives.offset
     if not np.allclose(R, np.eye(n)):
-        yield make("side", "torques of the motors are taken as torques of the joints: the gear ratio is missing", "set record.torque_side: motor", T=R.T)
-        yield make("side", "torques of the joints are taken as torques of the motors: the gear ratio is applied twice", "set record.torque_side: joint", T=inverse.T)
+        yield make(
+            "side",
+            "torques of the motors are taken as torques of the joints: the gear ratio is missing",
+            "set record.torque_side: motor",
+            T=R.T,
+        )
+        yield make(
+            "side",
+            "torques of the joints are taken as torques of the motors: the gear ratio is applied twice",
+            "set record.torque_side: joint",
+            T=inverse.T,
+        )
         yield make("side", "positions of the motors are taken as positions of the joints", "set record.side: motor", P=inverse, p=shift)
-        yield make("side", "positions of the joints are taken as positions of the motors", "set record.side: joint, torque_side: motor", P=R, p=-R @ shift)
-        yield make("side", "positions and torques of the motors are taken as those of the joints", "set record.side: motor", P=inverse, p=shift, T=R.T)
-        yield make("side", "positions and torques of the joints are taken as those of the motors", "set record.side: joint", P=R, p=-R @ shift, T=inverse.T)
+        yield make(
+            "side",
+            "positions of the joints are taken as positions of the motors",
+            "set record.side: joint, torque_side: motor",
+            P=R,
+            p=-R @ shift,
+        )
+        yield make(
+            "side",
+            "positions and torques of the motors are taken as those of the joints",
+            "set record.side: motor",
+            P=inverse,
+            p=shift,
+            T=R.T,
+        )
+        yield make(
+            "side",
+            "positions and torques of the joints are taken as those of the motors",
+            "set record.side: joint",
+            P=R,
+            p=-R @ shift,
+            T=inverse.T,
+        )
     if not np.allclose(constant, np.eye(n)):
         remedy = "look at record.units.tau: A of currents, N*m of torques"
-        yield make("unit", "torques are taken as currents: torque constants are applied to them", remedy, T=R.T @ np.linalg.inv(constant) @ inverse.T)
+        yield make(
+            "unit",
+            "torques are taken as currents: torque constants are applied to them",
+            remedy,
+            T=R.T @ np.linalg.inv(constant) @ inverse.T,
+        )
         yield make("unit", "currents are taken as torques: torque constants are missing", remedy, T=R.T @ constant @ inverse.T)
     if shift.any():
-        yield make("zero", "the offsets of the drives are used twice or with the wrong sign", "look at the sign of drives.offset", p=-2 * shift)
-        yield make("zero", "the offsets of the drives are missing", "set record.side: motor, or add drives.offset to the positions", p=shift)
+        yield make(
+            "zero", "the offsets of the drives are used twice or with the wrong sign", "look at the sign of drives.offset", p=-2 * shift
+        )
+        yield make(
+            "zero", "the offsets of the drives are missing", "set record.side: motor, or add drives.offset to the positions", p=shift
+        )
         yield make("zero", "the offsets of the drives are added to positions that have them", "leave drives.offset out", p=-shift)
     own = np.diag(R).copy()
     for i, k in combinations(range(n), 2):
@@ -231,7 +310,12 @@ def gravity(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
                 entry = f"{'+' if sign > 0 else '-'}{axis}0"
                 text = "gravity has the wrong sign: it points along " if np.allclose(g, -given) else "gravity points along "
                 listed = ", ".join(f"{x:.4g}" for x in g)
-                yield make("gravity", text + entry, f"set gravity: [{listed}], or turn frame 0", constants=dict(zip(("free_gx", "free_gy", "free_gz"), map(float, g), strict=True)))
+                yield make(
+                    "gravity",
+                    text + entry,
+                    f"set gravity: [{listed}], or turn frame 0",
+                    constants=dict(zip(("free_gx", "free_gy", "free_gz"), map(float, g), strict=True)),
+                )
 
 
 def table(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
@@ -242,21 +326,46 @@ def table(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
         for text, angle in TURNS.items():
             value = entry[f"free_alpha{j}"] + angle
             sign = " (its sign)" if np.isclose(np.cos(value), np.cos(entry[f"free_alpha{j}"])) else ""
-            yield make("angle", f"alpha of frame {j} is wrong by {text}{sign}", f"look at alpha of frame {j}: {_angle(value)} fits", constants={f"free_alpha{j}": value})
+            yield make(
+                "angle",
+                f"alpha of frame {j} is wrong by {text}{sign}",
+                f"look at alpha of frame {j}: {_angle(value)} fits",
+                constants={f"free_alpha{j}": value},
+            )
         for key in ("d", "r", "b"):
             length = entry.get(f"free_{key}{j}", 0.0)
             if length:
-                yield make("length", f"{key} of frame {j} has the wrong sign", f"look at {key} of frame {j}: {-length:g} fits", constants={f"free_{key}{j}": -length})
+                yield make(
+                    "length",
+                    f"{key} of frame {j} has the wrong sign",
+                    f"look at {key} of frame {j}: {-length:g} fits",
+                    constants={f"free_{key}{j}": -length},
+                )
                 for text, factor in FACTORS.items() if not SHORTEST < abs(length) < LONGEST else ():
-                    yield make("length", f"{key} of frame {j} is to be taken {text} times: mm and m", f"give {key} of frame {j} in m", constants={f"free_{key}{j}": factor * length})
+                    yield make(
+                        "length",
+                        f"{key} of frame {j} is to be taken {text} times: mm and m",
+                        f"give {key} of frame {j} in m",
+                        constants={f"free_{key}{j}": factor * length},
+                    )
         d, r = entry[f"free_d{j}"], entry[f"free_r{j}"]
         if d != r:
-            yield make("length", f"d and r of frame {j} are exchanged", f"exchange d and r of frame {j}", constants={f"free_d{j}": r, f"free_r{j}": d})
+            yield make(
+                "length",
+                f"d and r of frame {j} are exchanged",
+                f"exchange d and r of frame {j}",
+                constants={f"free_d{j}": r, f"free_r{j}": d},
+            )
     lengths = [key for key in entry if key[5] in "drb" and entry[key]]
     for text, factor in FACTORS.items():
         longest = max((abs(entry[key]) for key in lengths), default=1.0)
         if not 10 * SHORTEST < longest < LONGEST:
-            yield make("length", f"all lengths are to be taken {text} times: mm and m", "give lengths in m", constants={key: factor * entry[key] for key in lengths})
+            yield make(
+                "length",
+                f"all lengths are to be taken {text} times: mm and m",
+                "give lengths in m",
+                constants={key: factor * entry[key] for key in lengths},
+            )
     yield from _conventions(make, entry, frames)
 
 

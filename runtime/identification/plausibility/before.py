@@ -85,9 +85,15 @@ def positions(model: GeneratedModel, samples: Samples) -> Check:
         if still.any() and samples.n > 1:
             text = f"Joints {', '.join(str(model.JOINTS[j]) for j in np.flatnonzero(still))} stand still in the whole record"
             return Check(question, "doubtful", text, limit, "look at the columns of these positions; their parameters cannot be identified")
-        return Check(question, "good", f"They reach {_per_joint(model.JOINTS, largest, units, np.arange(samples.n) == np.argmax(largest))}", limit)
+        return Check(
+            question, "good", f"They reach {_per_joint(model.JOINTS, largest, units, np.arange(samples.n) == np.argmax(largest))}", limit
+        )
     text = "They reach " + _per_joint(model.JOINTS, largest, units, out)
-    degrees = bool((out & turning).any()) and float(np.median(largest[turning])) * np.pi / 180 < 2 * np.pi and float(largest[turning].max()) > 2 * TURNS[0]
+    degrees = (
+        bool((out & turning).any())
+        and float(np.median(largest[turning])) * np.pi / 180 < 2 * np.pi
+        and float(largest[turning].max()) > 2 * TURNS[0]
+    )
     if degrees:
         remedy = "degrees read as rad? set record.units.q: deg; or motor side read as joint side (record.side)"
     else:
@@ -95,7 +101,9 @@ def positions(model: GeneratedModel, samples: Samples) -> Check:
     return Check(question, "no" if far.any() or degrees else "doubtful", text, limit, remedy)
 
 
-def _against(model: GeneratedModel, samples: Samples, key: str, values: Array, sane: dict[str, tuple[float, float]], unit: str) -> tuple[State, str, str]:
+def _against(
+    model: GeneratedModel, samples: Samples, key: str, values: Array, sane: dict[str, tuple[float, float]], unit: str
+) -> tuple[State, str, str]:
     units = [f"{one}/{unit}" for one in joint_units(model)]
     limits = _limits(model, key)
     if limits is not None and limits.shape == (samples.n,):
@@ -122,12 +130,21 @@ def accelerations(model: GeneratedModel, samples: Samples) -> Check:
     """Largest acceleration of every joint."""
     state, text, limit = _against(model, samples, "qdd", np.abs(samples.qdd).max(axis=0), ACCELERATIONS, "s^2")
     remedy = "look at the sampling rate and the unit of time; noise of the positions asks for a lower signals.lowpass.cutoff"
-    return Check("Are the accelerations those of this robot?", "doubtful" if state == "no" and limit.startswith("limits") else state, f"They reach {text}", limit, remedy)
+    return Check(
+        "Are the accelerations those of this robot?",
+        "doubtful" if state == "no" and limit.startswith("limits") else state,
+        f"They reach {text}",
+        limit,
+        remedy,
+    )
 
 
 def torques(model: GeneratedModel, samples: Samples) -> Check:
     """Largest torque against limits.tau, where the robot file gives them; torques that never change."""
-    question, remedy = "Are the torques those of this robot?", "look at the unit, the side and the columns of the torques (record.units.tau, torque_side, columns.tau)"
+    question, remedy = (
+        "Are the torques those of this robot?",
+        "look at the unit, the side and the columns of the torques (record.units.tau, torque_side, columns.tau)",
+    )
     largest = np.abs(samples.tau).max(axis=0)
     flat = np.ptp(samples.tau, axis=0) <= 1e-9 * np.maximum(largest, 1e-12)
     if flat.any():

@@ -88,7 +88,12 @@ def _factors(problem: Problem) -> Iterator[Quantity]:
 
 def _guess(factor: float) -> str:
     """What a factor on a torque may be."""
-    for value, text in ((np.sqrt(2), "1.41: effective for peak values"), (np.sqrt(3), "1.73: phase for line values"), (2.0, "2: half of a pair of motors"), (9.81, "9.81: kp m for N m")):
+    for value, text in (
+        (np.sqrt(2), "1.41: effective for peak values"),
+        (np.sqrt(3), "1.73: phase for line values"),
+        (2.0, "2: half of a pair of motors"),
+        (9.81, "9.81: kp m for N m"),
+    ):
         for one in (value, 1 / value):
             if abs(np.log(factor / one)) < 0.05:
                 return text
@@ -171,7 +176,7 @@ def _standard(problem: Problem, alternative: Alternative) -> Array:
         if alternative.on_data:
             return np.asarray(problem.model.regressor(q, qd, qdd) @ problem.physical.K)
         assert problem.variants is not None
-        return np.asarray(problem.variants.regressor(q, qd, qdd, **alternative.constants))
+        return np.asarray(problem.variants.regressor(q, qd, qdd, out=None, **alternative.constants))
 
 
 def searched(problem: Problem) -> list[Trial]:
@@ -200,7 +205,9 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
     grid = sorted({float(np.clip(x, -quantity.span, quantity.span)) for x in grid})
     best = min(grid, key=score)
     width = max(abs(best) * 0.5, 2 * min(step.sigma, 0.25 * quantity.span))
-    found = minimize_scalar(score, bounds=(max(best - width, -quantity.span), min(best + width, quantity.span)), method="bounded", options={"maxiter": 12})
+    found = minimize_scalar(
+        score, bounds=(max(best - width, -quantity.span), min(best + width, quantity.span)), method="bounded", options={"maxiter": 12}
+    )
     xi = float(found.x) if found.fun < score(best) else best
     alternative = quantity.change(xi)
     grams = problem.grams(alternative)

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from runtime.model.inertia import Condition, PhysicalModel
+from runtime.model.inertia import PhysicalModel
 
 Array = np.ndarray
 
@@ -83,7 +83,7 @@ class Grams:
         """Root mean square residual of each joint, at least FLOOR of its torque, shape (n,); 1 of a joint without rows."""
         N = np.maximum(self.rows, 1)
         square = np.maximum(self.squares(X), FLOOR**2 * self.measured) / N
-        return np.where(square > 0, np.sqrt(square), 1.0)
+        return np.asarray(np.where(square > 0, np.sqrt(square), 1.0), dtype=float)
 
     def weighted(self, sigma: Array) -> tuple[Array, Array]:
         """A = sum_j W_j'W_j / sigma_j^2 and g = sum_j W_j'Y_j / sigma_j^2."""
@@ -211,8 +211,8 @@ class Barrier:
                 chi[row > 0] = np.maximum(chi[row > 0], self.size[k])
             elif row @ chi <= 0:  # values of a link beyond the usual extent
                 row[row < 0] *= 0.25 * (chi[row > 0] @ row[row > 0]) / -(chi[row < 0] @ row[row < 0])
-        for numbers, B in self.forms:
-            chi[numbers] = np.maximum(chi[numbers], _interior(B) * float(self.size[0]))
+        for places, B in self.forms:
+            chi[places] = np.maximum(chi[places], _interior(B) * float(self.size[0]))
         return chi
 
     @property

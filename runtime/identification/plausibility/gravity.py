@@ -61,7 +61,7 @@ def gravity_direction(problem: Problem) -> Gravity | None:
     def D(g: Array) -> Array:
         constants = dict(zip(("free_gx", "free_gy", "free_gz"), map(float, g), strict=True))
         assert problem.variants is not None
-        return np.asarray(problem.variants.regressor(s.q, s.qd, s.qdd, **constants))
+        return np.asarray(problem.variants.regressor(s.q, s.qd, s.qdd, out=None, **constants))
 
     rest = D(np.zeros(3))
     by_axis = np.stack([D(np.eye(3)[a]) - rest for a in range(3)])

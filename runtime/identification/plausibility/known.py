@@ -87,7 +87,7 @@ def known_values(problem: Problem) -> KnownValues | None:
         left = parts - friction @ np.linalg.lstsq(friction, parts, rcond=None)[0]
         rest = y - friction @ np.linalg.lstsq(friction, y, rcond=None)[0]
         size = np.linalg.norm(left, axis=0)
-        errors[j] = 100 * np.linalg.norm(rest - left.sum(axis=1)) / max(np.linalg.norm(y), 1e-300)
+        errors[j] = 100 * np.linalg.norm(rest - left.sum(axis=1)) / max(float(np.linalg.norm(y)), 1e-300)
         shown = size > SMALL * np.linalg.norm(y)
         if shown.any() and (shown.sum() == 1 or abs(left[:, 0] @ left[:, 1]) < 0.9 * size.prod()):
             ratios[j, shown] = np.linalg.lstsq(left[:, shown], rest, rcond=None)[0]

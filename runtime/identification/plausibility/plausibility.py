@@ -37,6 +37,8 @@ GAP = 1.0
 """Score of the best physical robot less that of free parameters, nats a row that counts, from which physics objects."""
 DENSITY = (0.3, 2e4)
 """Mass of a robot over the cube of its reach, kg/m^3: outside, the torques have another unit or side."""
+FEWEST = 20
+"""Rows of a joint that moves, below which nothing is judged but the record itself."""
 LATE = 0.004
 """Delay, s, from which it is told."""
 TILT = 15.0
@@ -90,9 +92,7 @@ class Plausibility:
 
     def table(self) -> Table:
         """The alternatives that come nearest, errors by joint in %."""
-        rows = [
-            (t.alternative.cause, f"{t.gain:+.0f}", *(f"{e:.1f}" for e in t.fit.errors)) for t in self.trials if t.fit is not None
-        ]
+        rows = [(t.alternative.cause, f"{t.gain:+.0f}", *(f"{e:.1f}" for e in t.fit.errors)) for t in self.trials if t.fit is not None]
         joints = len(self.trials[0].fit.errors) if self.trials and self.trials[0].fit is not None else 0
         header = ("changed", "gain, nats", *(f"joint {j + 1} %" for j in range(joints)))
         return Table("What would explain the record better (gain above 0), or as well", header, rows[:10], wide=(0,))
@@ -135,7 +135,9 @@ def plausibility(
     several = list(records) if isinstance(records, Sequence) else [records]
     whole = [record for record in several if isinstance(record, Record)]
     if len(whole) < len(several):
-        return Plausibility((Check("Do record and robot file suit each other?", "open", "Not asked: the record is read by blocks", "", "set stream: off"),))
+        return Plausibility(
+            (Check("Do record and robot file suit each other?", "open", "Not asked: the record is read by blocks", "", "set stream: off"),)
+        )
     progress("plausibility of the record")
     samples = samples_of(whole, study)
     try:
@@ -143,9 +145,10 @@ def plausibility(
     except InputError:
         physical = None
     checks = [*before_checks(model, samples, physical), rest(model, whole, study, samples)]
-    enough = int(samples.moving().sum()) > 2 * len(model.BASE_PARAMETERS)
+    rows = samples.moving().sum(axis=0)
+    enough = int(rows.sum()) > 2 * len(model.BASE_PARAMETERS) and int(rows.min()) > FEWEST
     if physical is None or not enough:
-        reason = "too few samples at which the joints move" if not enough else "the model has no standard parameters"
+        reason = "too few samples at which every joint moves" if not enough else "the model has no standard parameters"
         return Plausibility((*checks, Check("Does physics agree?", "open", f"Not asked: {reason}")))
     problem = problem_of(model, samples, variants)
     known = known_values(problem) if problem.barrier.near_values else None
@@ -162,12 +165,15 @@ def plausibility(
     named = decisive(trials)
     checks += [] if gravity is None else [direction(gravity, named)]
     checks += [better(problem, named, tried=bool(trials))] if trials else []
-    return Plausibility(tuple(checks), tuple(t for t in trials if t.fit is not None)[:10], tuple(named), _equivalent(problem), late, gravity, known)
+    return Plausibility(
+        tuple(checks), tuple(t for t in trials if t.fit is not None)[:10], tuple(named), _equivalent(problem), late, gravity, known
+    )
 
 
 def _ranked(trials: Sequence[Trial]) -> list[Trial]:
     """The best first; of the sampling rates one alone."""
-    ordered, kept = sorted(trials, key=lambda trial: -trial.gain), []
+    ordered = sorted(trials, key=lambda trial: -trial.gain)
+    kept: list[Trial] = []
     for trial in ordered:
         if not (trial.alternative.kind == "rate" and any(k.alternative.kind == "rate" and k.fit is not None for k in kept)):
             kept.append(trial)
@@ -214,7 +220,9 @@ def physics(model: GeneratedModel, problem: Problem) -> Check:
     gap = (given.score - given.penalty - free.score) / problem.N
     ratio = given.errors / np.maximum(free.errors, 0.3)
     j = int(np.argmax(ratio))
-    text = f"A physical robot leaves {given.errors[j]:.1f} % of the torque of joint {model.JOINTS[j]}, free parameters {free.errors[j]:.1f} %"
+    text = (
+        f"A physical robot leaves {given.errors[j]:.1f} % of the torque of joint {model.JOINTS[j]}, free parameters {free.errors[j]:.1f} %"
+    )
     limit = "about the same error"
     remedy = "a sign, an axis, a length or the order of the columns is wrong: look at the alternatives below"
     return Check("Can a physical robot explain the record?", "good" if gap < GAP else "doubtful", text, limit, remedy)
@@ -246,7 +254,11 @@ def values(known: KnownValues) -> Check:
         "subtracted as record.columns.tau_known; or the values are those of another robot"
     )
     ratios = [x for x in (*known.gravity, *known.inertia) if np.isfinite(x)]
-    text = f"Ratios of gravity and inertia torques from {min(ratios):.2f} to {max(ratios):.2f}" if ratios else "Too small beside friction to tell"
+    text = (
+        f"Ratios of gravity and inertia torques from {min(ratios):.2f} to {max(ratios):.2f}"
+        if ratios
+        else "Too small beside friction to tell"
+    )
     off = known.off
     state: State = "good" if not off else "doubtful"
     return Check(question, state, f"No: {'; '.join(off[:4])}" if off else text, limit, remedy)

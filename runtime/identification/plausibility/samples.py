@@ -91,10 +91,9 @@ def samples_of(records: Sequence[Record], study: Study, most: int = MOST) -> Sam
         Records too short for the filters.
     """
     parts = [_filtered(record, study, number) for number, record in enumerate(records)]
-    every = Samples(
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in ("t", "q", "qd", "qdd", "tau", "known", "record")),
-        min(part.cutoff for part in parts),
-    )
+    names = ("t", "q", "qd", "qdd", "tau", "known", "record")
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    every = Samples(**joined, cutoff=min(part.cutoff for part in parts))
     return every.thinned(most)
 
 
@@ -117,9 +116,7 @@ def _filtered(record: Record, study: Study, number: int) -> Samples:
     states = filtered_states(record.q, record.rate, replace(study.signals, lowpass=low))
     known = getattr(record, "tau_known", None)
     known = np.zeros_like(record.tau) if known is None else known
-    tau, known = (
-        lowpass_filtered(median_filtered(x, study.signals.median), record.rate, low) for x in (record.tau + known, known)
-    )
+    tau, known = (lowpass_filtered(median_filtered(x, study.signals.median), record.rate, low) for x in (record.tau + known, known))
     step = max(1, int(0.8 * record.rate / (2 * cutoff)))
     t0, t1 = study.rows.window
     inside = (record.t >= (-np.inf if t0 is None else t0)) & (record.t <= (np.inf if t1 is None else t1))

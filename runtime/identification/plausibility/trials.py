@@ -87,7 +87,7 @@ class Problem:
         assert model is not None
         try:
             with np.errstate(all="ignore"):
-                D = model.regressor(q, qd, qdd, **alternative.constants)
+                D = model.regressor(q, qd, qdd, out=None, **alternative.constants)
         except ValueError:  # a loop that does not close
             return None
         if not np.isfinite(D).all():
