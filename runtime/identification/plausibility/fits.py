@@ -77,7 +77,7 @@ class Grams:
     def squares(self, X: Array) -> Array:
         """||Y_j - W_j X||^2, shape (n,)."""
         v = np.append(X, -1.0)
-        return np.maximum(np.einsum("i,jik,k->j", v, self.of_joints, v), 0.0)
+        return np.asarray(np.maximum(np.einsum("i,jik,k->j", v, self.of_joints, v), 0.0))
 
     def sigma(self, X: Array) -> Array:
         """Root mean square residual of each joint, at least FLOOR of its torque, shape (n,); 1 of a joint without rows."""

@@ -155,8 +155,8 @@ def plausibility(
     alone = problem_of(model, samples, variants, values=False) if known is not None else problem
     gravity = gravity_direction(problem)
     late = delays(model, whole, study)
-    checks += [physics(model, alone), size(model, alone), *([] if late is None else [delayed(late)])]
-    checks += [] if known is None else [values(known)]
+    asked = (physics(model, alone), size(model, alone), None if late is None else delayed(late), None if known is None else values(known))
+    checks += [check for check in asked if check is not None]
     trials: list[Trial] = []
     if variants is not None or any(check.state in WORST[:2] for check in checks):
         progress("what would explain the record better")
@@ -228,8 +228,8 @@ def physics(model: GeneratedModel, problem: Problem) -> Check:
     return Check("Can a physical robot explain the record?", "good" if gap < GAP else "doubtful", text, limit, remedy)
 
 
-def size(model: GeneratedModel, problem: Problem) -> Check:
-    """Mass that the torques ask for, against the reach of the robot."""
+def size(model: GeneratedModel, problem: Problem) -> Check | None:
+    """Mass that the torques ask for, against the reach of the robot; None where that is not known."""
     from runtime.identification.plausibility.trials import FARTHEST, reach
 
     question, limit = "Do the torques suit the size of the robot?", f"{DENSITY[0]:g} to {DENSITY[1]:g} kg per cubic metre of reach"
@@ -237,7 +237,7 @@ def size(model: GeneratedModel, problem: Problem) -> Check:
     physical = problem.physical
     masses = sum(problem.given.X[physical.link(j)[-1]] for j in physical.links)
     if not physical.links or length > FARTHEST or length <= 0.1:
-        return Check(question, "open", "Not asked: the reach of the robot file is not known", limit)
+        return None
     density = masses / length**3
     text = f"They ask for a robot of about {masses:.2g} kg with a reach of {length:.2g} m"
     state: State = "good" if DENSITY[0] <= density <= DENSITY[1] else "doubtful"
@@ -274,12 +274,12 @@ def delays(model: GeneratedModel, records: Sequence[Record], study: Study) -> De
         return None
 
 
-def delayed(late: Delay) -> Check:
-    """Time shift between positions and torques."""
+def delayed(late: Delay) -> Check | None:
+    """Time shift between positions and torques; None where the record does not tell."""
     question, limit = "Do positions and torques belong to the same instants?", f"shift below {1e3 * LATE:g} ms"
     known = np.isfinite(late.sigma)
     if not known.any():
-        return Check(question, "open", "The record does not tell", limit)
+        return None
     certain = np.isfinite(late.common) and abs(late.common) > max(CERTAIN * late.sigma_common, LATE)
     text = f"Torques are {'late' if late.common > 0 else 'early'} by {1e3 * abs(late.common):.1f} ms, deviation {1e3 * late.sigma_common:.1f} ms"
     j = int(np.nanargmax(late.before - late.after))
