@@ -66,7 +66,8 @@ class GraphAlgebra:
         self.graph.name(angle, "th" + label)
         c, s = self.graph.cos(angle), self.graph.sin(angle)
         for value, letter in ((c, "C"), (s, "S")):
-            self.angles[value.node.index] = (turn, rest)
+            backward = value.sign < 0  # the node is the sine of minus the angle: its sum begins with a joint that is subtracted
+            self.angles[value.node.index] = (tuple((j, -n) for j, n in turn), -rest) if backward else (turn, rest)
             self.graph.name(value, letter + label)
         if not forward:
             s = -s

@@ -13,6 +13,7 @@ from fractions import Fraction
 
 from symgen.derive.graph import Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.scalar import Turn
 from symgen.description.expression import ONE, Call, Expression, Monomial, call
 from symgen.symbols.polynomial import BITS, ONES, Coefficient, Polynomial, Rank, Ring
 
@@ -69,7 +70,7 @@ class Expansion:
         self._written: dict[int, Monomial] = {}
         for node in algebra.graph.nodes:  # angles by which sums of products may be written shorter
             if node.index in algebra.angles and algebra.angles[node.index][0]:
-                turn, rest = algebra.angles[node.index]
+                turn, rest, _ = _forward(*algebra.angles[node.index])
                 self.ring.angle(turn, rest, str(node.name)[1:])
 
     def of(self, outputs: Sequence[Scalar | int]) -> list[Polynomial]:
@@ -100,8 +101,9 @@ class Expansion:
                 turn, rest = self.algebra.angles[node.index]
                 if not turn:
                     return self._expression(call(node.op, rest))
+                turn, rest, sign = _forward(turn, rest)
                 angle = ring.angles[turn, rest]
-                return {angle.cos if node.op == "cos" else angle.sin: 1}
+                return {angle.cos: 1} if node.op == "cos" else {angle.sin: sign}
             case "sqrt":
                 return self._expression(self.algebra.roots[node.index])
             case "inv":
@@ -223,6 +225,11 @@ def _parts(a: Polynomial, fields: int) -> dict[int, Polynomial]:
 def _factors_of(group: Group) -> int:
     """Symbols of a group as it is written."""
     return sum(sum(abs(n) for _, n in m) + (abs(c) != 1) for e in (group.common, group.inside) for m, c in e.terms.items())
+
+
+def _forward(turn: Turn, rest: Expression) -> tuple[Turn, Expression, int]:
+    """An angle whose first joint is added, and the sign that its sine takes on by that."""
+    return (turn, rest, 1) if turn[0][1] > 0 else (tuple((j, -n) for j, n in turn), -rest, -1)
 
 
 def _whole(c: Fraction) -> Coefficient:
