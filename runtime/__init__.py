@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from runtime.observation.observation import Observation, observe
     from runtime.records.reading import read_record
     from runtime.records.record import Record
+    from runtime.records.resampling import resample
     from runtime.reporting.files import report
     from runtime.resolution.advice import Advice
     from runtime.resolution.advisor import advise
@@ -57,6 +58,7 @@ __all__ = [
     "plausibility",
     "read_record",
     "report",
+    "resample",
     "simulate",
 ]
 
@@ -74,6 +76,7 @@ _MODULES = {
     "runtime.observation.observation": ("Observation", "observe"),
     "runtime.records.reading": ("read_record",),
     "runtime.records.record": ("Record",),
+    "runtime.records.resampling": ("resample",),
     "runtime.reporting.files": ("report",),
     "runtime.resolution.advice": ("Advice",),
     "runtime.resolution.advisor": ("advise",),

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.records.time_stamps import TimeStamps, time_stamps
+from runtime.records.remedies import remedies
+from runtime.records.time_stamps import time_stamps
 
 Array = np.ndarray
 
@@ -91,7 +92,11 @@ def rate_of(stamps: Stamps, t: Array) -> float:
         if not (np.diff(t) > 0).any():
             raise
         regularity = time_stamps(t, file=stamps.file)
-        cure = "" if regularity.regular and regularity.jitter <= stamps.jitter else f". record.resample: {_cure(regularity)}"
+        cure = (
+            ""
+            if regularity.regular and regularity.jitter <= stamps.jitter
+            else f". {remedies(t, regularity, arrays=stamps.column is None)}"
+        )
         raise InputError(f"{e.message}. In all: {regularity.to_text(stamps.row)}{cure}", file=e.file, column=e.column, row=e.row) from None
 
 
@@ -109,8 +114,7 @@ def _require_uniform(stamps: Stamps, blocks: Iterable[Array], first: float, rate
         N += len(t)
     if deviation > stamps.jitter:
         raise stamps.error(
-            f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step {length:g} s here, {1 / rate:g} s on average; "
-            "where the clock alone is at fault, state record.rate without columns.t, or raise record.jitter (below 0.5)",
+            f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step {length:g} s here, {1 / rate:g} s on average",
             place,
         )
 
@@ -121,8 +125,3 @@ def _steps(blocks: Iterable[Array]) -> Iterator[tuple[Array, Array]]:
     for t in blocks:
         yield t, np.diff(np.concatenate([before, t]))
         before = [float(t[-1])]
-
-
-def _cure(regularity: TimeStamps) -> str:
-    cut, cuts = ("{gaps: split}", "cuts there and ") if regularity.gaps or regularity.resets else ("{}", "")
-    return f"{cut} {cuts}interpolates at the stamps, with method: count it takes the samples as uniform"

@@ -15,13 +15,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from runtime.errors import InputError
-from runtime.records.time_stamps import TimeStamps
+from runtime.records.remedies import remedies
+from runtime.records.time_stamps import GAP, TimeStamps, time_stamps
 from runtime.settings.record import SHORTEST, Resample
+from runtime.settings.schema import structure
 
 Array = np.ndarray
 
@@ -36,6 +40,53 @@ class Stretch:
 
     t: Array
     signals: tuple[Array, ...]
+
+
+def resample(
+    t: ArrayLike, x: ArrayLike, rate: float | None = None, *, method: Literal["cubic", "linear"] = "cubic", longest: float = GAP
+) -> tuple[Array, Array]:
+    """Signals brought from irregular stamps to a uniform rate, between two samples by a cubic spline or a straight line.
+
+        t_k = t[0] + k / rate,   k = 0 ... floor((t[-1] - t[0]) rate)
+
+    Parameters
+    ----------
+    t : array_like, shape (N,), s
+        Stamps of the samples, increasing; a repeated stamp keeps its first sample.
+    x : array_like, shape (N,) or (N, n)
+        Samples.
+    rate : float, Hz, optional
+        Default: that of the regular steps.
+    method : str
+        cubic or linear.
+    longest : float, periods
+        Steps up to this length are bridged; the period is the median step.
+
+    Returns
+    -------
+    t : ndarray, shape (K,), s
+        Uniform.
+    x : ndarray, shape (K,) or (K, n)
+        Signals there.
+
+    Raises
+    ------
+    InputError
+        Time that goes back, a longer gap, a rate below that of the record, or numbers that are not finite.
+    """
+    t, x = np.asarray(t, dtype=float), np.asarray(x, dtype=float)
+    if t.ndim != 1 or x.ndim not in (1, 2) or len(x) != len(t) or len(t) < SHORTEST:
+        raise InputError(f"t {t.shape}, x {x.shape}; expected (N,) and (N,) or (N, n), N at least {SHORTEST}")
+    if not (np.isfinite(t).all() and np.isfinite(x).all()):
+        raise InputError("t or x holds nan or infinity; repair or cut the record")
+    settings = structure(Resample, {"rate": rate, "method": method, "longest": longest, "shortest": 0.0}, ())
+    stamps = time_stamps(t, gap=settings.longest)
+    if method not in ("cubic", "linear"):
+        raise InputError(f"method {method!r}; expected cubic or linear")
+    if stamps.gaps or stamps.resets:
+        raise InputError(f"time has gaps of more than {longest:g} periods, or goes back. {remedies(t, time_stamps(t), arrays=True)}")
+    ((stretch,), _, _) = resampled(t, [x[:, None] if x.ndim == 1 else x], stamps, settings, None, file="t")
+    return stretch.t, stretch.signals[0][:, 0] if x.ndim == 1 else stretch.signals[0]
 
 
 def resampled(

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runtime import observe, read_record
+from runtime import estimate, observe, read_record, resample
 from runtime.errors import InputError
 from runtime.identification.coupling import coupling_fits
 from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import are_large, open_stream, records_or_streams
 from runtime.records.record import Record
+from runtime.records.remedies import remedies
 from runtime.records.resampling import resampled
 from runtime.records.time_stamps import time_stamps
 from runtime.settings.study import Resample, study_from_mapping
@@ -199,7 +200,8 @@ def test_errors_tell_all_irregularities(tmp_path):
         with pytest.raises(InputError) as e:
             read_record(study(columns={"t": "t"}, **record).record[0], folder=tmp_path)
         assert "a.npz" in str(e.value) and said in str(e.value)
-        assert record or "record.resample: {gaps: split} cuts there and interpolates at the stamps, with method: count" in str(e.value)
+        remedy = "Remedy: record.resample: {gaps: split} leaves 2 pieces of 0.5 s or more, 100 % of the time; with method: count"
+        assert record or remedy in str(e.value)
         assert "rate" in record or ("1 gap at sample 801" in str(e.value) and "1 repeated stamp at sample 101" in str(e.value))
 
 
@@ -252,3 +254,86 @@ def test_coupling_of_a_split_record(tmp_path):
     fits = coupling_fits(model, records, asked, lambda changed: observe(model, changed, asked))
     assert len(records) == 2
     assert set(fits) == {"both", "position", "torque", "none"} and set(fits["both"].provenance["files"]) == {"a.npz"}
+
+
+# --- remedies -----------------------------------------------------------------------------------------------------------
+
+
+def record_with(folder, t, q, tau, **record):
+    """Records and study of a log, perhaps resampled."""
+    np.savez(folder / "log.npz", t=t, q=q, tau=tau)
+    columns = {"t": None if "rate" in record else "t", "q": "q", "tau": "tau"}
+    asked = study_from_mapping({"record": {"files": "log.npz", "columns": columns, **record}, "signals": {"lowpass": {"cutoff": 30}}})
+    return read_records(asked.record, planar, folder=folder), asked
+
+
+def test_the_remedy_named_is_the_best_of_the_three(tmp_path):
+    """A controller of 1 kHz whose log lacks one sample in twenty, in gaps of a few: bridged, the error is that of the noise; the others are worse."""
+    from planar_data import TRUE, motion
+
+    rng = np.random.default_rng(3)
+    t = np.arange(12000) / 1000
+    q, qd, qdd = motion(t)
+    tau = planar.inverse_dynamics(q, qd, qdd, TRUE) + rng.normal(0, 0.02, q.shape)
+    kept = np.ones(len(t), bool)
+    for start in rng.choice(len(t) - 20, 150, replace=False):
+        kept[start + 1 : start + rng.integers(3, 9)] = False
+    log = t[kept], q[kept], tau[kept]
+    with pytest.raises(InputError) as e:
+        record_with(tmp_path, *log)
+    said = str(e.value)
+    lost = 12000 - kept.sum()
+    assert f"1/median step is 1000 Hz: about {lost} samples are missing" in said and "Remedy: record.resample: {longest: " in said
+    assert "{gaps: split} would leave" in said and "record.rate: " in said and "shift them by up to" in said
+    longest = float(said.partition("{longest: ")[2].partition("}")[0])
+    mean = float(said.partition("record.rate: ")[2].split()[0])
+    error = {}
+    for name, record in (
+        ("longest", {"resample": {"longest": longest}}),
+        ("gaps", {"resample": {"gaps": "split", "shortest": 0.1}}),
+        ("rate", {"rate": mean}),
+    ):
+        records, asked = record_with(tmp_path, *log, **record)
+        error[name] = np.linalg.norm(estimate(planar, records, asked).X / TRUE - 1)
+    assert error["longest"] < error["gaps"] and error["longest"] < 0.5 * error["rate"], error
+
+
+@pytest.mark.parametrize(
+    ("step", "said"),
+    [
+        (np.where(np.arange(4000) == 2000, 1.5, 0.002), "{gaps: split} leaves 2 pieces of 0.5 s or more, 100 % of the time"),
+        (
+            np.where(np.arange(4000) % 40 == 0, 0.006001, np.where(np.arange(4000) == 2001, 1.5, 0.002)),
+            "{gaps: split, longest: 4} bridges 100 gaps",
+        ),
+        (0.002 * (1 + np.random.default_rng(0).uniform(-0.3, 0.3, 4000)), "{} interpolates at the stamps; record.rate"),
+        (
+            np.diff(0.002 * (np.arange(4001) + np.random.default_rng(0).uniform(-0.3, 0.3, 4001))),
+            "the stamps scatter about a uniform clock",
+        ),
+    ],
+)
+def test_the_remedy_fits_the_clock(step, said):
+    t = np.concatenate([[0.0], np.cumsum(step)])
+    assert said in remedies(t, time_stamps(t))
+
+
+def test_resample():
+    rng = np.random.default_rng(1)
+    t = np.delete(np.arange(3000) / RATE, rng.choice(2900, 200, replace=False) + 50)
+    grid, x = resample(t, signal(t), 250 * 2, longest=6)
+    np.testing.assert_allclose(np.diff(grid), 0.002, rtol=1e-9)
+    np.testing.assert_allclose(x[20:-20], signal(grid)[20:-20], atol=0.02)
+    _, one = resample(t, signal(t)[:, 0], 500, longest=6)
+    np.testing.assert_array_equal(one, x[:, 0])
+    record = Record(grid, x, x)
+    assert record.rate == pytest.approx(500)
+    for wrong, match in (
+        ((t, signal(t)[:-1]), "expected"),
+        ((t[::-1], signal(t)), "never goes forward"),
+        ((t + (t > 3), signal(t), 500), "one Record for each piece"),
+        ((t, signal(t) * np.nan), "nan"),
+        ((t, signal(t), 50), "would be folded"),
+    ):
+        with pytest.raises(InputError, match=match):
+            resample(*wrong, longest=6)
