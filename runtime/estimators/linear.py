@@ -18,7 +18,7 @@ from runtime.errors import SettingsError
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.estimate import Estimate, JointFit, Status
 from runtime.estimators.solution import Solution, solve
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.observation.qr_factor import Array, Factor
 from runtime.observation.system import Observation
 from runtime.settings.study import EstimateSettings, to_mapping
@@ -134,7 +134,7 @@ def assemble(
     corrected[_undetermined(system, fit)] = np.nan
     norms = [joint.residual_norm(fit.X) for joint in system.raw.joints]
     measured = [joint.measured_norm for joint in system.raw.joints]
-    labels = [str(j) for j in (model.JOINTS if model is not None else range(1, observation.n + 1))]
+    labels = joint_labels(model) if model is not None else tuple(map(str, range(1, observation.n + 1)))
     share = 1 - fit.rank / system.raw.rows
     per_joint = tuple(
         JointFit(
@@ -215,7 +215,9 @@ def describe(observation: Observation, model: GeneratedModel | None = None) -> d
         own = version("symgen")
     except PackageNotFoundError:
         own = "not installed"
-    robot = {} if model is None else {"robot": model.NAME, "robot_sha256": model.SOURCE_SHA256}
+    robot: dict[str, Any] = {} if model is None else {"robot": model.NAME, "robot_sha256": model.SOURCE_SHA256}
+    if labels := getattr(model, "LABELS", {}):
+        robot["labels"] = {f"q{j}": str(name) for j, name in labels.items()}
     return {**robot, "files": dict(observation.files), "versions": {"symgen": own, "numpy": np.__version__, "scipy": scipy.__version__}}
 
 

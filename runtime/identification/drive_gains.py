@@ -31,7 +31,7 @@ from runtime.estimators.linear import assemble
 from runtime.estimators.ols import system
 from runtime.identification.payload import load_columns
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.model.inertia import physical_model
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, stack
 from runtime.observation.qr_factor import triangularise
@@ -135,7 +135,7 @@ def drive_gains(
     exact, load, V = observation.W[:, : -n - 1], observation.W[:, -n - 1], observation.W[:, -n:]
     deviations, alone, sigma_alone = _alone(observation, exact, load, drives)
     together, sigma = _together(observation, exact, load, V, deviations, drives, seed)
-    return DriveGains(tuple(map(str, model.JOINTS)), np.asarray(drives.torque_constant), together, sigma, alone, sigma_alone)
+    return DriveGains(joint_labels(model), np.asarray(drives.torque_constant), together, sigma, alone, sigma_alone)
 
 
 def _with_motors(model: GeneratedModel, record: Record, study: Study, drives: Drives) -> Observation:

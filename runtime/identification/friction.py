@@ -39,7 +39,7 @@ from runtime.identification.friction_laws import (
     percent,
 )
 from runtime.identification.residuals import correlation_time, residual_correlation
-from runtime.model.generated import GeneratedModel, elements_of, require
+from runtime.model.generated import GeneratedModel, elements_of, joint_labels, require
 from runtime.model.inertia import physical_model
 from runtime.observation.filters import decimated
 from runtime.observation.observation import decimated_torque, observation_from_states
@@ -162,7 +162,7 @@ def friction_curves(model: GeneratedModel, records: Sequence[Record], study: Stu
     """Friction against velocity, one curve per joint, from records of the joint side and an estimate of all parameters."""
     require(model, "inverse_dynamics")
     parts = [_terms(model, record, study, fit, k) for k, record in enumerate(records)]
-    return tuple(_curve(str(model.JOINTS[j]), joined([part[j] for part in parts])) for j in range(len(model.JOINTS)))
+    return tuple(_curve(label, joined([part[j] for part in parts])) for j, label in enumerate(joint_labels(model)))
 
 
 def own_friction(model: GeneratedModel, j: int) -> list[int]:

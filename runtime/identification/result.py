@@ -17,6 +17,7 @@ from runtime.identification.friction import FrictionCurve
 from runtime.identification.payload_study import PayloadStudy
 from runtime.identification.plausibility.plausibility import Plausibility
 from runtime.identification.record_errors import RecordError, record_errors
+from runtime.identification.torque_unit import torque_unit_doubt
 from runtime.identification.uncertainty import Uncertainty
 from runtime.identification.validation import Comparison, CrossValidation, WeakDirections
 from runtime.json_documents import json_text
@@ -205,13 +206,15 @@ class Identification:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to look at before the values are used, in sentences: signs that no drive has, lost joints, parameters that trade."""
+        """What to look at before the values are used, in sentences: signs that no drive has, torques that may be currents, lost joints, parameters that trade."""
         signs = (
             f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: a sign of the joint is wrong (ratio, torque constant or "
             "column), or its coupling, unit or frame."
         )
         lost = lost_joints(self.estimate, self.model_estimate)
-        return (*([signs] if self.negative else []), *([f"{lost}."] if lost else []), *self.correlations.warnings)
+        unit = torque_unit_doubt(self.model, self.observation)
+        sentences = (signs if self.negative else "", f"{unit}." if unit else "", f"{lost}." if lost else "")
+        return (*(sentence for sentence in sentences if sentence), *self.correlations.warnings)
 
     def __str__(self) -> str:
         return self.to_text()

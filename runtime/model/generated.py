@@ -175,6 +175,12 @@ def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[
     return {**model.CONSTANTS, **constants}
 
 
+def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
+    """What results call the joints: the number of each, and its name where the robot file has one."""
+    names = getattr(model, "LABELS", {})
+    return tuple(f"{j} {name}" if isinstance(name := names.get(j), str) else str(j) for j in model.JOINTS)
+
+
 def elements_of(model: GeneratedModel, constants: Mapping[str, float] | None = None) -> Mapping[str, Any]:
     """Elements of a model (friction, inertia, springs): kind, direction of motion, and row or form by joint, of each parameter.
 

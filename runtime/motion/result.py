@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.model.generated import GeneratedModel, joint_units
+from runtime.model.generated import GeneratedModel, joint_labels, joint_units
 from runtime.records.record import Record
 from runtime.table import Table
 
@@ -112,9 +112,9 @@ class Simulation:
     def table(self) -> Table:
         """Tracking error and torque of each joint."""
         error, effort = self.q - self.q_r, np.abs(self.tau).max(axis=0)
-        columns = (self.model.JOINTS, _rms(error), np.abs(error).max(axis=0), effort, self.saturated, self.at_rest, self.units)
+        columns = (joint_labels(self.model), _rms(error), np.abs(error).max(axis=0), effort, self.saturated, self.at_rest, self.units)
         rows = [
-            (str(j), f"{rms:.3g}", f"{most:.3g}", f"{tau:.4g}", f"{100 * saturated:.2f} %", f"{100 * rest:.2f} %", ", ".join(units))
+            (j, f"{rms:.3g}", f"{most:.3g}", f"{tau:.4g}", f"{100 * saturated:.2f} %", f"{100 * rest:.2f} %", ", ".join(units))
             for j, rms, most, tau, saturated, rest, units in zip(*columns, strict=True)
         ]
         steps = f"{self.substeps} integration step{'s' * (self.substeps > 1)} per tick"

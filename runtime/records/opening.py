@@ -95,6 +95,12 @@ class RecordFiles:
         """How messages name the time stamps, and what they must be."""
         return Stamps(self.first.file, self.columns.t, self.first.row, self.settings.rate, self.settings.jitter)
 
+    @property
+    def note(self) -> str:
+        """What the files tell of the columns that are read, a sentence; "" for nothing."""
+        notes = (table.note(list(groups.values())) for table, groups in groups_of(self.columns, self.tables))
+        return "; ".join(note for note in notes if note)
+
     def read(self) -> Samples:
         """All samples, joint side, SI."""
         parts: dict[str, Array] = {}

@@ -88,6 +88,7 @@ def read_pieces(settings: RecordSettings, label: Label, drives: Drives | None, f
     try:
         samples = opened.read()
         stretches, rate, text = _uniform(opened, samples)
+        text = "; ".join(part for part in (text, opened.note) if part)
     finally:
         opened.close()
     K = len(stretches)

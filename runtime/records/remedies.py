@@ -21,6 +21,7 @@ from runtime.settings.record import Resample
 
 BRIDGED, BRIDGED_PERIODS = 0.02, 10.0  # s, and periods: gaps up to the longer one are bridged
 KEPT = 0.95  # of the time: pieces that keep less are no remedy by themselves
+NEAR = 0.2  # periods: steps so near to several periods say that samples are missing, others that the clock wanders
 SCATTER = -0.25  # correlation of neighbouring steps: below it stamps scatter about a uniform clock
 SHORTEST = Resample().shortest
 
@@ -45,7 +46,10 @@ def remedies(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
     mean, most = len(taken) / float(taken.sum()), 1 / stamps.period
     pauses = f", {_count(len(gaps) - len(short), 'pause')} aside," if len(short) < len(gaps) else ""
     count = f"{len(taken) + 1} samples in {taken.sum():.6g} s{pauses} are {mean:.6g} Hz, 1/median step is {most:.6g} Hz"
-    if missing := int(np.sum(np.maximum(np.round(taken / stamps.period) - 1, 0))):
+    whole = np.round(taken / stamps.period)
+    counted = int(np.sum(whole[np.abs(taken / stamps.period - whole) < NEAR] - 1))
+    missing = round(float(taken.sum()) / stamps.period) - len(taken)
+    if missing > 0 and counted > missing / 2:
         count += f": about {missing} samples are missing ({100 * missing / (len(t) + missing):.2g} %)"
     bridge = f"bridges {_count(len(short), 'gap')} of up to {short.max():.0f} periods by interpolation" if len(short) else ""
     longest = float(np.ceil(short.max() + 0.5)) if len(short) else 0.0

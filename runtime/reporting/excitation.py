@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 
+from runtime.model.generated import joint_labels
 from runtime.reporting.figures import STYLE, panels_figure, shared_legend
 from runtime.reporting.page import Image, Page, Section
 
@@ -32,7 +33,7 @@ def motion_figure(excitation: Excitation) -> Figure:
     with mpl.rc_context(STYLE):
         figure, axes = panels_figure(4, 1, (7.2, 8.4))
         for ax, (title, x, share) in zip(axes, panels, strict=True):
-            for j, name in enumerate(excitation.model.JOINTS):
+            for j, name in enumerate(joint_labels(excitation.model)):
                 ax.plot(t, x[:, j], linewidth=1.0, linestyle=LINES[j // 7 % 4], color=f"C{j % 7}", label=f"joint {name}")
             if share:
                 ax.set_ylim(-1.08, 1.08)

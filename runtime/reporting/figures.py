@@ -23,6 +23,7 @@ BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = "#000000", "#0072B2", "#D55E00",
 MARKED = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"), (SKY, "v"), ("#8C6D00", "P"))
 STYLE: Any = {
     "font.size": 9.0,
+    "text.parse_math": False,  # names of joints are shown as they are
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,

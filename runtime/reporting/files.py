@@ -12,6 +12,7 @@ from runtime.excitation.search import Excitation
 from runtime.identification.fleet import Fleet
 from runtime.identification.result import Identification
 from runtime.json_documents import json_text
+from runtime.model.generated import joint_labels
 from runtime.motion.result import Simulation
 from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays
@@ -123,7 +124,7 @@ def _(result: Advice, folder: Path, study: Study) -> Files:
 @files_of.register
 def _(result: Simulation, folder: Path, study: Study) -> Files:
     """The record, a study that reads it back, figures of merit, the figure."""
-    figure = simulation_figure(result.model.JOINTS, result, result.units)
+    figure = simulation_figure(joint_labels(result.model), result, result.units)
     record = RecordSettings(files=(str(folder / RECORD),), rate=result.rate, name=result.name)
     return {
         RECORD: result.to_csv(),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from runtime.motion.result import Simulation
 
 
-def simulation_figure(joints: Sequence[int], simulation: Simulation, units: Sequence[tuple[str, str]]) -> Figure:
+def simulation_figure(joints: Sequence[str], simulation: Simulation, units: Sequence[tuple[str, str]]) -> Figure:
     """A row per joint: position and reference, tracking error, torque. units : of position and torque, by joint."""
     with mpl.rc_context(STYLE):
         figure, axes = panels_figure(len(joints), 3, (10.5, 1.6 * len(joints) + 0.8))

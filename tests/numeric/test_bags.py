@@ -101,6 +101,29 @@ def test_what_a_message_lacks_is_named(tmp_path, spoil, said):
     assert "run" in str(e.value) and "message 7 of /j: " in str(e.value) and said in str(e.value)
 
 
+def test_several_publishers(tmp_path):
+    """A gripper and a wheel publish on the topic of the arm, before it and between: skipped and counted; the clock is that of the arm."""
+    arm = joint_states(STAMPS, JOINTS, Q, TAU)
+    grip = joint_states(STAMPS - 1_234_567, ("grip", "left"), Q, TAU[:, :0])
+    wheel = joint_states(STAMPS[::3] + 500, ("wheel",), Q[::3, :1], TAU[::3, :1])
+    messages = sorted([*arm, *grip, *wheel], key=lambda message: message[0])
+    path = bag(tmp_path, topics={"/joint_states": messages})
+    record = read_record(settings(path))
+    np.testing.assert_array_equal(record.q, Q)
+    np.testing.assert_array_equal(record.tau, TAU)
+    np.testing.assert_array_equal(record.t, np.arange(N) / RATE)
+    others = len(grip) + len(wheel)
+    assert record.time.endswith(f"{others} of {N + others} messages on /joint_states have none of these joints and are skipped")
+    wheel_alone = read_record(settings(path, columns={"q": ["wheel"]}))
+    np.testing.assert_array_equal(wheel_alone.q, Q[::3, :1])
+    spoilt = [*messages[:8], (int(STAMPS[-1]) + 7, JOINTS[:1], Q[0, :1], (), TAU[0, :1]), *messages[8:]]
+    with pytest.raises(InputError, match="message 94 of /joint_states: no joint elbow; it has shoulder"):
+        read_record(settings(write_bag("mcap", tmp_path / "other", {"/joint_states": spoilt})))
+    nan = [(s, names, np.array(q) * (np.nan if names == JOINTS and k > 4 else 1), *rest) for k, (s, names, q, *rest) in enumerate(messages)]
+    with pytest.raises(InputError, match="message 7 of /joint_states"):
+        read_record(settings(write_bag("mcap", tmp_path / "nan", {"/joint_states": nan})))
+
+
 def test_topics(tmp_path):
     first, second = joint_states(STAMPS, JOINTS, Q, TAU), joint_states(STAMPS, JOINTS, 2 * Q, TAU)
     path = bag(tmp_path, topics={"/left/joint_states": first, "/right/joint_states": second})

@@ -110,3 +110,19 @@ def test_undetermined_parameters_end_the_assessment(model):
     still = replace(record, q=np.column_stack([record.q[:, 0], np.zeros(len(record))]))
     result = assess(model, still, STUDY)
     assert not result.determined and result.checklist.state == "no" and "does not determine" in result.missing[0]
+
+
+def test_torques_that_are_currents_are_asked_about(model):
+    """Currents of a drive of 12 N m/A run like the torques of the file's values at a twelfth of their size; true torques raise no question."""
+    record = measured(model, 0)
+    assert not any("currents" in sentence for sentence in runtime.identify(model, record).warnings)
+    result = runtime.identify(model, runtime.Record(record.t, record.q, record.tau / 12))
+    (question,) = (sentence for sentence in result.warnings if "currents" in sentence)
+    assert (
+        question.startswith("the torques of joint 1, 2 run like those of the values in the robot file at 0.08")
+        and "units.tau: A" in question
+    )
+    bare = SimpleNamespace(**{**vars(model), "VALUES": {}})
+    assert not any(
+        "currents" in sentence for sentence in runtime.identify(bare, runtime.Record(record.t, record.q, record.tau / 12)).warnings
+    )

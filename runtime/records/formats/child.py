@@ -21,7 +21,7 @@ from runtime.files import allowed
 from runtime.records.formats.columns import Source, Table
 from runtime.records.formats.table import Format, format_of, needed
 
-CALLS = ("samples", "widths", "scalar", "row", "blocks")
+CALLS = ("samples", "note", "widths", "scalar", "row", "blocks")
 
 
 def serve() -> None:

@@ -101,6 +101,10 @@ class Table(ABC):
     def samples(self, groups: Groups) -> int:
         """Length of the named columns."""
 
+    def note(self, groups: Groups) -> str:
+        """What a reader of the named columns should know, a sentence; "" for nothing."""
+        return ""
+
     def require(self, names: Sequence[str]) -> None:
         """Raise InputError unless these columns are there and can be read."""
         check_names(names, self.names, self.file)

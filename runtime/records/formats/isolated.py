@@ -112,6 +112,9 @@ class IsolatedTable(Table):
     def samples(self, groups: Groups) -> int:
         return int(self._value("samples", groups))
 
+    def note(self, groups: Groups) -> str:
+        return "" if self.joints is None else str(self._value("note", groups))
+
     def blocks(self, groups: Groups, size: int = BLOCK) -> Iterator[tuple[Array, ...]]:
         return self._answers("blocks", groups, size)
 

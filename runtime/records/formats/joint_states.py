@@ -1,14 +1,15 @@
 """Columns of the messages sensor_msgs/JointState of one topic: time, and position, velocity and effort of every joint by its name.
 
 The column `shoulder.position` is the position of the joint `shoulder`; in `record.columns` the name of the joint is enough: q means position, tau effort.
-A message names its joints itself, so that their order may change from message to message.
+A message names its joints itself, so that their order may change from message to message. Where several nodes publish on a topic, such as those of an arm and
+of its gripper, messages that hold none of the joints that are asked for are skipped and counted; one that holds some of them is an error.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -43,19 +44,29 @@ class JointState:
 
 @dataclass(eq=False, kw_only=True)
 class JointTable(Table):
-    """The messages of a topic as columns `t`, `<joint>.position` ...; time in s from the first message on."""
+    """The messages of a topic as columns `t`, `<joint>.position` ...; time in s from the first message that is read."""
 
     what = "a bag"
 
     messages: tuple[JointState, ...]
+    chosen: tuple[int, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
-        first = self.messages[0]
-        self.joints = first.joints
-        self.names = ("t", *(f"{joint}.{quantity}" for joint in first.joints for quantity in QUANTITIES if len(getattr(first, quantity))))
+        first: dict[str, JointState] = {}
+        for message in self.messages:
+            for joint in message.joints:
+                first.setdefault(joint, message)
+        self.joints = tuple(first)
+        self.names = ("t", *(f"{joint}.{x}" for joint, message in first.items() for x in QUANTITIES if len(getattr(message, x))))
+        self.chosen = tuple(range(len(self.messages)))
 
     def samples(self, groups: Groups) -> int:
-        return len(self.messages)
+        self._choose([name for group in groups for name in group])
+        return len(self.chosen)
+
+    def note(self, groups: Groups) -> str:
+        skipped = len(self.messages) - self.samples(groups)
+        return f"{skipped} of {len(self.messages)} messages on {self.topic} have none of these joints and are skipped" if skipped else ""
 
     def require(self, names: Sequence[str]) -> None:
         """Any quantity of any joint may be asked for: a message that lacks it is named."""
@@ -65,18 +76,25 @@ class JointTable(Table):
                 check_names([name], self.names, f"{self.file}, {self.topic}")
 
     def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
-        for a in range(0, len(self.messages), size):
-            yield [self._column(name, a, min(a + size, len(self.messages))) for name in names]
+        self._choose(names)
+        for a in range(0, len(self.chosen), size):
+            yield [self._column(name, self.chosen[a : a + size]) for name in names]
 
     def row(self, i: int) -> str:
-        return f"message {i + 1} of {self.topic}"
+        return f"message {self.chosen[i] + 1} of {self.topic}"
 
-    def _column(self, name: str, start: int, stop: int) -> Array:
+    def _choose(self, names: Sequence[str]) -> None:
+        """Read the messages that hold a joint of these columns; all of them where none does, so that the first one tells what is missing."""
+        asked = {name.rpartition(".")[0] for name in names} - {""}
+        some = tuple(i for i, message in enumerate(self.messages) if asked.intersection(message.joints))
+        self.chosen = some or tuple(range(len(self.messages)))
+
+    def _column(self, name: str, chosen: Sequence[int]) -> Array:
         if name == "t":
-            first = self.messages[0].stamp
-            return np.array([message.stamp - first for message in self.messages[start:stop]], dtype=np.int64) / NANOSECONDS
+            first = self.messages[self.chosen[0]].stamp
+            return np.array([self.messages[i].stamp - first for i in chosen], dtype=np.int64) / NANOSECONDS
         joint, _, quantity = name.rpartition(".")
-        return np.array([self._value(i, joint, quantity) for i in range(start, stop)])
+        return np.array([self._value(i, joint, quantity) for i in chosen])
 
     def _value(self, i: int, joint: str, quantity: str) -> float:
         message = self.messages[i]
@@ -89,7 +107,9 @@ class JointTable(Table):
             reason = f"{len(values)} values of {quantity} for {len(message.joints)} joints"
         else:
             reason = f"joint {joint} more than once"
-        raise InputError(f"{reason}; expected every message to hold what the record names", file=self.file, row=self.row(i))
+        raise InputError(
+            f"{reason}; expected every message to hold what the record names", file=self.file, row=f"message {i + 1} of {self.topic}"
+        )
 
 
 def joint_columns(table: Table, quantity: str, names: Sequence[str]) -> tuple[str, ...]:
