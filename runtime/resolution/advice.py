@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,15 @@ from scipy.special import stdtrit
 
 from runtime.estimators.estimate import Estimate
 from runtime.json_documents import json_text
-from runtime.resolution.result import BIASED, CONFIDENCE, DECIDING, deciding_names
+from runtime.resolution.result import BIASED, CONFIDENCE, DECIDING, NEGLIGIBLE, deciding_names
 from runtime.resolution.runs import Level
 from runtime.table import Table
 
 Array = np.ndarray
 
+LIMITS = (NEGLIGIBLE, BIASED)  # %e at which a step is sought
+ALL = "all"  # Label of the advice on all encoders alike
+NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
 AGREED = 0.3  # Relative difference of predicted and sampled %e that passes as agreement: 15 % in Delta, as %e grows with its square
 
 
@@ -111,6 +114,24 @@ class EncoderAdvice:
 
 
 @dataclass(frozen=True, eq=False)
+class ReaderAdvice:
+    """Advice on real encoders, whose law is phase, by one reader.
+
+    Attributes
+    ----------
+    reader : str
+        lowpass: read as positions; counts.
+    encoders : tuple of EncoderAdvice
+        All together first, then one at a time.
+    notes : tuple of str
+    """
+
+    reader: str
+    encoders: tuple[EncoderAdvice, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Advice:
     """Advice on the encoders of one robot, and on its torque sensors.
 
@@ -128,6 +149,8 @@ class Advice:
         Change predicted there.
     torque_sigma : ndarray, shape (b,)
         Deviation of the parameters per N m (N) of deviation of the motor torques.
+    real : tuple of ReaderAdvice
+        Real encoders read as positions, and as counts; empty where they were not asked for.
     assumptions : tuple of str
     settings, provenance : mapping
     """
@@ -139,6 +162,7 @@ class Advice:
     steps: Array
     torque_sigma: Array
     assumptions: tuple[str, ...]
+    real: tuple[ReaderAdvice, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -167,29 +191,42 @@ class Advice:
     @property
     def negative(self) -> bool:
         """Whether least squares would be biased at one of the steps asked for, or the runs contradict the prediction."""
-        contradicted = any(not limit.agrees for encoder in self.encoders for limit in encoder.limits)
+        several = (*self.encoders, *(encoder for reader in self.real for encoder in reader.encoders))
+        contradicted = any(not limit.agrees for encoder in several for limit in encoder.limits)
         return contradicted or any(self.worst(k)[1] > BIASED for k in range(len(self.asked)))
 
     @property
     def verdict(self) -> str:
         """The answer in words."""
-        first = self.encoders[0]
+        both = bool(self.real) and self.encoders is not self.real[0].encoders
+        parts = [] if self.real and not both else self._answers(self.encoders)
+        for reader in self.real:
+            parts += [f"Real encoders read as {NAMES[reader.reader]}:", *self._answers(reader.encoders)]
+        parts.append("Noise of the torques does not bias the estimate; it adds to sigma.")
+        return " ".join(parts)
+
+    def _answers(self, encoders: Sequence[EncoderAdvice]) -> list[str]:
+        """Sentences on some encoders, all together first."""
+        first, single = encoders[0], encoders[1:]
         parts = [self._sentence(limit, "With every encoder alike", first.unit) for limit in first.limits]
-        single = self.encoders[1:]
         for unit in dict.fromkeys(advice.unit for advice in single) if len(single) > 1 else ():
-            hardest = min((advice for advice in single if advice.unit == unit), key=lambda advice: advice.limits[0].delta)
+            known = [advice for advice in single if advice.unit == unit and not np.isnan(advice.limits[0].delta)]
+            if not known:
+                continue
+            hardest = min(known, key=lambda advice: advice.limits[0].delta)
             limit, kind = hardest.limits[0], "" if unit == self.unit else f" in {unit}"
             parts.append(
                 f"Of single encoders{kind}, that of joint {hardest.label} asks most: {step_text(limit.delta, unit)} for "
                 f"{limit.percent:g} % ({limit.parameter or 'no parameter'})."
             )
-        doubted = [f"{advice.label} at {limit.percent:g} %" for advice in self.encoders for limit in advice.limits if not limit.agrees]
+        doubted = [f"{advice.label} at {limit.percent:g} %" for advice in encoders for limit in advice.limits if not limit.agrees]
         if doubted:
             parts.append(f"Sampling does not confirm the prediction for: {', '.join(doubted)}; trust the runs.")
-        parts.append("Noise of the torques does not bias the estimate; it adds to sigma.")
-        return " ".join(parts)
+        return parts
 
     def _sentence(self, limit: Limit, who: str, unit: str) -> str:
+        if np.isnan(limit.delta):
+            return f"{who}, {limit.parameter} changes by more than {limit.percent:g} % at the finest step that was tried."
         if not np.isfinite(limit.delta):
             return f"{who}, no step makes a parameter that matters change by {limit.percent:g} %."
         text = f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = {step_text(limit.delta, unit)} {self.place} ({limit.parameter} first"
@@ -202,8 +239,34 @@ class Advice:
 
     def to_table(self) -> str:
         """Steps by encoder, then by parameter, then what was assumed."""
-        tables = [table.to_text() for table in (self.step_table(), self.parameter_table())]
+        tables = [table.to_text() for table in self.tables()]
         return "\n\n".join([*tables, *self.asked_lines(), "\n".join(f"- {text}" for text in self.assumptions)])
+
+    def tables(self) -> list[Table]:
+        """Steps by encoder, by the chapter's law and of real encoders by both readers, then by parameter."""
+        if not self.real:
+            return [self.step_table(), self.parameter_table()]
+        if self.encoders is self.real[0].encoders:
+            return [self.reader_table(), self.parameter_table()]
+        return [self.step_table(), self.reader_table(), self.parameter_table()]
+
+    def reader_table(self) -> Table:
+        """Coarsest steps of real encoders, read as positions beside read as counts."""
+        headers, rows = ["encoder"], []
+        for reader in self.real:
+            for limit in reader.encoders[0].limits:
+                headers += [f"{NAMES[reader.reader]}, {limit.percent:g} %", "first parameter", "sampled %e"]
+        for k, advice in enumerate(self.real[0].encoders):
+            cells = [advice.label if advice.unit == self.unit else f"{advice.label}, {advice.unit}"]
+            for reader in self.real:
+                for limit in reader.encoders[k].limits:
+                    sampled = "-" if limit.sampled is None else f"{limit.error:.2f} ± {limit.half_width:.2f}"
+                    step = "none" if np.isnan(limit.delta) else f"{limit.delta:.3g}"
+                    turn = counts(limit.delta) if advice.unit == "rad" else ""
+                    cells += [turn or step, limit.parameter or "-", sampled]
+            rows.append(tuple(cells))
+        caption = "Real encoders, counts of random phase: coarsest step of each, the others exact; none: not even the finest step tried"
+        return Table(caption, headers, rows)
 
     def step_table(self) -> Table:
         """Coarsest steps by encoder."""
@@ -255,18 +318,8 @@ class Advice:
                 "deciding": self.deciding,
                 "deciding_relative_sigma": DECIDING,
                 "verdict": self.verdict,
-                "encoders": [
-                    {
-                        "encoder": advice.label,
-                        "unit": advice.unit,
-                        "limits": advice.limits,
-                        "delta": advice.delta,
-                        "change": advice.change,
-                        "sampled": advice.sampled,
-                        "reached": {f"{limit.percent:g}": advice.reached(limit.percent) for limit in advice.limits},
-                    }
-                    for advice in self.encoders
-                ],
+                "encoders": [_summary(advice) for advice in self.encoders],
+                "real": {reader.reader: [_summary(advice) for advice in reader.encoders] for reader in self.real},
                 "asked": [
                     {"delta": delta, "change": change, "worst": self.worst(k)}
                     for k, (delta, change) in enumerate(zip(self.asked, self.steps, strict=True))
@@ -277,6 +330,35 @@ class Advice:
                 "provenance": self.provenance,
             }
         )
+
+
+def _summary(advice: EncoderAdvice) -> dict[str, Any]:
+    return {
+        "encoder": advice.label,
+        "unit": advice.unit,
+        "limits": advice.limits,
+        "delta": advice.delta,
+        "change": advice.change,
+        "sampled": advice.sampled,
+        "reached": {f"{limit.percent:g}": advice.reached(limit.percent) for limit in advice.limits},
+    }
+
+
+def confirmed(advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]) -> EncoderAdvice:
+    """The advice with runs at the steps of its limits; of all encoders, also between and above them."""
+    made = {limit.delta: level(limit.delta) for limit in advice.limits if np.isfinite(limit.delta)}
+    limits = []
+    for limit in advice.limits:
+        if limit.delta in made:
+            point, i = made[limit.delta], reference.names.index(limit.parameter)
+            limit = replace(limit, sampled=point, error=abs(float(point.change[i])), half_width=float(point.half_width[i]))
+        limits.append(limit)
+    if advice.label == ALL and made:
+        low, high = min(made), max(made)
+        for delta in (np.sqrt(low * high), 2 * high, 5 * high):
+            if delta <= advice.delta[-1]:
+                made[float(delta)] = level(float(delta))
+    return replace(advice, limits=tuple(limits), sampled=tuple(made[delta] for delta in sorted(made)))
 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:

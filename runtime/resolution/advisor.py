@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
+from itertools import count
 from operator import add
 from typing import Any, cast
 
@@ -38,21 +39,18 @@ from runtime.observation.observation import stack
 from runtime.observation.position_errors import NormalEquations, Perturbation, perturbation
 from runtime.records.provenance import origin
 from runtime.records.record import Record
-from runtime.resolution.advice import Advice, EncoderAdvice, Limit, Sampled, crossing, sampled
+from runtime.resolution.advice import ALL, LIMITS, Advice, EncoderAdvice, Limit, ReaderAdvice, Sampled, confirmed, crossing, sampled
 from runtime.resolution.perturbed import Task, prepared, study_columns, system_of
-from runtime.resolution.result import BIASED, DECIDING, NEGLIGIBLE, deciding_names
-from runtime.resolution.rounding import rounded, stream
+from runtime.resolution.readers import READERS, real_encoders
+from runtime.resolution.result import DECIDING, deciding_names
+from runtime.resolution.rounding import VARIANCE, rounded, stream
 from runtime.settings.study import Study, to_mapping
 
 Array = np.ndarray
 Progress = Callable[[int, int], None]
 
-LIMITS = (NEGLIGIBLE, BIASED)  # %e at which a step is sought
-VARIANCE = {"two-point": 1.0, "gaussian": 1.0, "uniform": 1 / 3, "quantise": 1 / 3}
-"""Variance of a rounding over Delta^2, `runtime.resolution.rounding`."""
 RATIO = 1.3  # Ratio of neighbouring steps of a curve
 WALK = 40  # Steps tried below and above the first guess
-ALL = "all"  # Label of the advice on all encoders alike
 BELOW, ABOVE = 3, 9  # Steps of the curve of all encoders below the first limit and above the last: factors of 2 and 10
 
 
@@ -102,8 +100,11 @@ def advise(
     confirm: bool = True,
     progress: Progress | None = None,
     provenance: Mapping[str, Any] | None = None,
+    real: bool | None = None,
 ) -> Advice:
     """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted; side, rounding, columns and runs by study.cestac.
+
+    Real encoders, law phase, are judged twice: read as positions and read as counts (`runtime.resolution.readers`).
 
     Parameters
     ----------
@@ -127,6 +128,8 @@ def advise(
         Called with the number of choices of encoders done and their total.
     provenance : mapping, optional
         Further entries of Advice.provenance; names and time stamps of the records are there.
+    real : bool, optional
+        Judge real encoders; default: where study.cestac.rounding is phase.
 
     Raises
     ------
@@ -134,15 +137,17 @@ def advise(
         A method that is not linear least squares, or a median filter, which no prediction goes through.
     """
     study = study or Study()
+    study = replace(study, cestac=replace(study.cestac, delta=()))  # steps are what is sought
     records = (records,) if isinstance(records, Record) else tuple(records)
     _refuse(study)
+    law, drives = study.cestac.rounding, drives or drives_of(model)
     names = study_columns(model, records, study, columns, constants)
     parts = tuple(perturbation(model, record, study, names, drives=drives, constants=constants) for record in records)
     settings = replace(study.estimate, columns="all")
     measured = stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
     system = linear_system(measured, settings)
     reference = assemble(system, system.solve(), model=model, provenance={**origin(records), **(provenance or {})})
-    predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[study.cestac.rounding])
+    predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
     decisive = [names.index(name) for name in deciding_names(reference)]
     every = range(len(model.JOINTS))
     task = Task(
@@ -157,22 +162,35 @@ def advise(
     )
     units = joint_units(model) if study.cestac.side == "joint" else ("rad",) * len(model.JOINTS)  # motors turn
     selections = _selections(model, encoders)
+    total = len(selections) * ((law != "phase") + len(READERS) * (real or law == "phase"))
+    done = count(1)
+
+    def advance() -> None:
+        if progress is not None:
+            progress(next(done), total)
+
+    by_reader: tuple[ReaderAdvice, ...] = ()
+    if real or law == "phase":
+        rate = np.abs(Predictor(parts, predictor.weights, VARIANCE["phase"]).rate(every)[decisive]).max(initial=0.0)
+        start = float(np.sqrt(LIMITS[0] / rate)) if np.isfinite(rate) and rate > 0 else np.inf
+        given: dict[str, Any] = {"drives": drives, "constants": dict(constants or {}), "confirm": confirm, "progress": advance}
+        by_reader = real_encoders(model, records, study, reference, selections, units, start, **given)
     advices = []
-    for label, own in selections.items():
+    for label, own in selections.items() if law != "phase" else ():
         unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
         advice = _advice(predictor, label, own, names, decisive, unit)
         if confirm:
             advice = confirmed(advice, reference, partial(sampled_level, task, parts, reference, own))
         advices.append(advice)
-        if progress is not None:
-            progress(len(advices), len(selections))
+        advance()
     return Advice(
         names=names,
         reference=reference,
-        encoders=tuple(advices),
+        encoders=tuple(advices) if advices else by_reader[0].encoders,
+        real=by_reader,
         asked=tuple(asked),
         steps=np.array([predictor.change(delta, every) for delta in asked]).reshape(len(asked), len(names)),
-        torque_sigma=torque_sigma(predictor, drives or drives_of(model)),
+        torque_sigma=torque_sigma(predictor, drives),
         assumptions=assumptions(study, records, parts, reference),
         settings={
             **measured.settings,
@@ -255,22 +273,6 @@ def _coarse(task: Task, part: Perturbation, k: int, delta: float, encoders: Sequ
     return np.asarray(q + error @ part.root.T)
 
 
-def confirmed(advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]) -> EncoderAdvice:
-    """The advice with runs at the steps of its limits; of all encoders, also between and above them."""
-    made = {limit.delta: level(limit.delta) for limit in advice.limits if np.isfinite(limit.delta)}
-    limits = []
-    for limit in advice.limits:
-        if limit.delta in made:
-            point, i = made[limit.delta], reference.names.index(limit.parameter)
-            limit = replace(limit, sampled=point, error=abs(float(point.change[i])), half_width=float(point.half_width[i]))
-        limits.append(limit)
-    if advice.label == ALL and made:
-        low, high = min(made), max(made)
-        for delta in (np.sqrt(low * high), 2 * high, 5 * high):
-            made[float(delta)] = level(float(delta))
-    return replace(advice, limits=tuple(limits), sampled=tuple(made[delta] for delta in sorted(made)))
-
-
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
     """Deviation of X, shape (b,), per unit deviation of white noise of every motor torque."""
     n = predictor.parts[0].observation.n
@@ -296,6 +298,7 @@ def assumptions(study: Study, records: Sequence[Record], parts: Sequence[Perturb
         "gaussian": "normal, deviation Delta",
         "uniform": "uniform within +-Delta, variance Delta^2/3",
         "quantise": "to the grid of step Delta below or above, taken as white noise of variance Delta^2/3",
+        "phase": "to the grid of step Delta, to the nearest, of random phase",
     }[cestac.rounding]
     rates = ", ".join(f"{record.rate:g} Hz" for record in records)
     filters = (

@@ -64,14 +64,14 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
         Positions too coarse for one Delta of which the counts cannot be read.
     """
     settings, signals = study.cestac, study.signals
-    if settings.rounding != "phase" or settings.place == "loop" or not settings.delta:
+    if settings.rounding != "phase" or settings.place == "loop":
         return None
     own_drives = drives if settings.side == "motor" else None
     q = record.q if own_drives is None else own_drives.motor_position(record.q)
     known = signals.step is not None and signals.side == settings.side
     given: Any = signals.step if known else [smallest_step(x) for x in q.T]
     step = np.broadcast_to(np.asarray(given, dtype=float), (record.n,))
-    finest, coarsest = min(settings.delta), int(np.argmax(step))
+    finest, coarsest = min(settings.delta, default=np.inf), int(np.argmax(step))
     if finest <= 1.001 * step[coarsest]:
         raise SettingsError(
             f"{finest:.4g}, while encoder {coarsest + 1} of {record.name} has steps of {step[coarsest]:.4g} itself: counts rounded at their own step or "

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.errors import InputError
 from runtime.estimators.closed_loop import LoopPart
 from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import linear_companion, observed, point_estimate
@@ -116,21 +115,18 @@ def prepared(
     part : rows of a simulated loop, chosen by its reference; default: by the measured velocities.
     """
     signals = replace(study.signals, median=study.cestac.median)
-    counts, note = None, ""
-    if signals.reader == "counts":
-        try:
-            counts = observed_states(model, record.q, record.rate, signals, drives=drives, name=record.name)
-        except InputError as e:
-            if signals.step is not None:
-                raise
-            note = f"As measured, {e}; the estimate that runs are compared with takes these positions as they are, by the low-pass."
+    own, counts, note = own_encoder(record, study, drives), None, ""
+    if signals.reader == "counts" and (signals.step is not None or (own is not None and own.reading is not None)):
+        known = signals if signals.step is not None or own is None else replace(signals, step=tuple(own.step), side=study.cestac.side)
+        counts = observed_states(model, record.q, record.rate, known, drives=drives, name=record.name)
+    elif signals.reader == "counts":
+        note = f"Beside these steps the positions of {record.name} count as exact: the estimate that runs are compared with reads them by the low-pass."
     if part is None:
         states = counts or filtered_states(record.q, record.rate, signals)
         selection = select_rows(record, states.qd, signals, study.rows)
         torque = decimated_torque(record.tau, selection)
     else:
         selection, torque = part.selection, part.torque
-    own = own_encoder(record, study, drives)
     return PreparedRecord(record.q, record.tau, record.rate, dict(record.files), selection, torque, counts, own, note)
 
 

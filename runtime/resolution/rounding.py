@@ -43,14 +43,14 @@ def rounded(x: Array, step: float, mode: Mode, rng: np.random.Generator, uneven:
     if mode == "phase":
         columns = x.reshape(len(x), -1).T
         phases = step * rng.random(len(columns))
-        return np.stack([_counted(own, step, phi, uneven, rng) for own, phi in zip(columns, phases, strict=True)], axis=-1).reshape(x.shape)
+        return np.stack([counted(own, step, phi, uneven, rng) for own, phi in zip(columns, phases, strict=True)], axis=-1).reshape(x.shape)
     cell = x / step
     below = np.floor(cell)
     up = (signs(x.shape, rng) > 0) & (cell > below)  # a value on the grid stays there
     return np.asarray(step * (below + up))
 
 
-def _counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.Generator) -> Array:
+def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.Generator) -> Array:
     """Positions, shape (N,), that an encoder of these lines shows of x."""
     cell = (x - phase) / step
     if not uneven:

@@ -86,7 +86,14 @@ def cestac(
         try:
             with session.progress_bar("encoders" if advise else "runs") as progress:
                 if advise:
-                    result = advice = runtime.advise(model, records, study, asked=study.cestac.delta if delta else (), progress=progress)
+                    result = advice = runtime.advise(
+                        model,
+                        records,
+                        study,
+                        asked=study.cestac.delta if delta else (),
+                        progress=progress,
+                        real=rounding in (None, "phase"),
+                    )
                     text, negative = f"{advice.to_table()}\n\n{advice.verdict}", advice.negative
                 else:
                     simulator = session.simulator_of(robot, model, study, needed=study.cestac.place == "loop")

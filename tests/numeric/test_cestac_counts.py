@@ -41,7 +41,7 @@ def test_a_run_reads_the_counts_of_its_draw():
     seen = observation_from_states(planar, states, decimated_torque(RECORD.tau, selection), selection, columns=NAMES)
     X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
     assert np.allclose(found.levels[0].runs[1].X, X, rtol=1e-8)
-    assert found.settings["signals"]["reader"] == "counts" and "takes these positions as they are" in found.notes[0]
+    assert found.settings["signals"]["reader"] == "counts" and "count as exact" in found.notes[0]
 
 
 def test_counts_are_worth_more_than_positions():

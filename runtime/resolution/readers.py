@@ -1,0 +1,253 @@
+"""How coarse a real encoder may be, read as positions and read as counts: the change of the estimate along steps of law phase, by both readers.
+
+    error of encoder i, as read         e_i = reader(phi_i + Delta round((x_i - phi_i)/Delta)) - reader of the record, filtered alike
+    states with the encoders S coarse   those of the record + sum over i in S of (R^-1)_i e_i
+    change at Delta                     mean of the least squares of PHASES phases, over that of the record, less 1
+
+White noise does not describe a sawtooth that is locked to the motion, still less what a reader of counts leaves of it, so no first-order law is used:
+the mean over the random phase is a quadrature. Its nodes are equidistant, shuffled from encoder to encoder, so that the harmonics of the sawtooth cancel
+that are linear in the estimate; what is left is the bias. One reading of all encoders serves every choice S. Limits are where the curve crosses 1 % and
+5 %; runs of random phase confirm them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.methods import linear_system
+from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel
+from runtime.observation.counts import read_counts
+from runtime.observation.filters import SpeedErrors, States, filtered_states
+from runtime.observation.observation import observation_from_states, stack
+from runtime.observation.states import encoder_root, joint_states
+from runtime.records.record import Record
+from runtime.resolution.advice import LIMITS, EncoderAdvice, Limit, ReaderAdvice, Sampled, confirmed, crossing, sampled
+from runtime.resolution.own_encoder import FINER
+from runtime.resolution.perturbed import PreparedRecord, prepared
+from runtime.resolution.result import deciding_names
+from runtime.resolution.rounding import counted, stream
+from runtime.settings.study import EstimateSettings, Study
+
+Array = np.ndarray
+
+Reader = Literal["lowpass", "counts"]
+
+READERS: tuple[Reader, ...] = ("lowpass", "counts")
+PHASES = 4  # nodes of the quadrature over the phase
+RATIO = 1.5  # of neighbouring steps
+DOWN, UP = 8, 16  # most steps below and above the first
+LINES = 8  # fewest steps of an encoder in its motion
+QUADRATURE = 1 << 20  # number of the first stream of the nodes: beyond those of runs
+
+
+@dataclass(frozen=True, eq=False)
+class Encoders:
+    """One record at its encoders.   x : positions at the encoders as measured, shape (N, n).   states : joint side, as measured.   root : R^-1."""
+
+    record: PreparedRecord
+    x: Array
+    states: States
+    root: Array
+    drives: Drives | None
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Errors of q, qd, qdd as read, encoder side, shape (N, n) each, zero where exact; deviation of qd."""
+
+    states: States
+    deviation: Array
+
+
+class RealEncoders:
+    """What one reader makes of coarser encoders on several records of one robot."""
+
+    def __init__(
+        self,
+        model: GeneratedModel,
+        records: Sequence[Record],
+        study: Study,
+        names: Sequence[str],
+        drives: Drives | None,
+        constants: Mapping[str, float],
+        reader: Reader,
+    ) -> None:
+        own = study.signals if reader == study.signals.reader else replace(study.signals, reader=reader, step=None, side="joint")
+        self.study = replace(study, signals=own, cestac=replace(study.cestac, rounding="phase", delta=(), place="record"))
+        self.model, self.names, self.constants, self.reader = model, tuple(names), dict(constants), reader
+        self.estimate: EstimateSettings = replace(study.estimate, columns="all")
+        side = drives if study.cestac.side == "motor" else None
+        self.parts = []
+        for record in records:
+            part = prepared(model, record, self.study, drives)
+            x = record.q if side is None else side.motor_position(record.q)
+            states = part.states or filtered_states(record.q, record.rate, part.selection.signals)
+            self.parts.append(Encoders(part, x, replace(states, errors=None), encoder_root(side, record.n), side))
+        self.reference = self._solved([self._none(part) for part in self.parts], ())
+
+    @property
+    def coarsest(self) -> Array:
+        """Largest step of each encoder, shape (n,): LINES of them in its motion; inf of one at rest."""
+        spans = np.min([np.ptp(part.x, axis=0) for part in self.parts], axis=0)
+        return np.where(spans > 0, spans / LINES, np.inf)
+
+    def nodes(self, delta: float, moving: Sequence[int]) -> list[list[Errors]]:
+        """Errors of every record at the nodes of the quadrature, the encoders `moving` coarse."""
+        shuffled = [stream(self.study.cestac.seed, QUADRATURE + i).permutation(PHASES) for i in range(len(self.model.JOINTS))]
+        shift = stream(self.study.cestac.seed, QUADRATURE).random(len(shuffled))
+        at = [np.array([(order[k] + u) / PHASES for order, u in zip(shuffled, shift, strict=True)]) for k in range(PHASES)]
+        return [[self._errors(part, delta, delta * phases, moving, stream(self.study.cestac.seed, QUADRATURE, k)) for part in self.parts]
+                for k, phases in enumerate(at)]  # fmt: skip
+
+    def change(self, nodes: Sequence[Sequence[Errors]], encoders: Sequence[int]) -> Array:
+        """Mean change of the estimate, shape (b,), %, with these encoders coarse."""
+        return np.asarray(100 * (np.mean([self._solved(errors, encoders) for errors in nodes], axis=0) / self.reference - 1))
+
+    def sampled(self, reference: Estimate, encoders: Sequence[int], delta: float, runs: int | None = None) -> Sampled:
+        """CESTAC by law phase with these encoders coarse, eqs. (17), (18), (21)."""
+        X = []
+        for run in range(runs or self.study.cestac.runs):
+            rng = stream(self.study.cestac.seed, run, *encoders)
+            phases = delta * rng.random(len(self.model.JOINTS))
+            X.append(self._solved([self._errors(part, delta, phases, encoders, rng) for part in self.parts], encoders))
+        return sampled(delta, np.array(X), self.reference)
+
+    def _errors(self, part: Encoders, delta: float, phases: Array, encoders: Sequence[int], rng: np.random.Generator) -> Errors:
+        uneven, chosen = self.study.cestac.uneven, list(encoders)
+        y = np.column_stack([counted(part.x[:, i], delta, phases[i], uneven, rng) for i in chosen])
+        rate, signals = part.record.rate, part.record.selection.signals
+        deviation = np.zeros_like(part.x)
+        if self.reader == "counts":
+            read = joint_states(read_counts(y, rate, delta), rate, signals, None)
+            assert read.errors is not None
+            deviation[:, chosen] = read.errors.deviation
+        else:
+            read = filtered_states(np.asfortranarray(y), rate, signals)
+        into = np.linalg.inv(part.root).T
+        errors = self._none(part).states
+        for got, of, error, at in zip(_three(read), _three(part.states), _three(errors), (True, False, False), strict=True):
+            if part.drives is None:
+                exact = of
+            else:
+                exact = part.drives.motor_position(of) if at else of @ into
+            error[:, chosen] = got - exact[:, chosen]
+        return Errors(errors, deviation)
+
+    def _none(self, part: Encoders) -> Errors:
+        zero = np.zeros_like(part.x)
+        return Errors(States(zero, zero.copy(), zero.copy()), zero)
+
+    def _solved(self, errors: Sequence[Errors], encoders: Sequence[int]) -> Array:
+        """X with the errors of some encoders."""
+        chosen = np.isin(np.arange(len(self.model.JOINTS)), list(encoders))
+        rows = []
+        for part, error in zip(self.parts, errors, strict=True):
+            q, qd, qdd = (of + (own * chosen) @ part.root.T for of, own in zip(_three(part.states), _three(error.states), strict=True))
+            states = States(q, qd, qdd, SpeedErrors(error.deviation * chosen, part.root) if self.reader == "counts" else None)
+            record = part.record
+            rows.append(
+                observation_from_states(
+                    self.model, states, record.torque, record.selection, files=record.files, columns=self.names, constants=self.constants
+                )
+            )
+        return linear_system(rows[0] if len(rows) == 1 else stack(rows), self.estimate).solve().X
+
+
+def real_encoders(
+    model: GeneratedModel,
+    records: Sequence[Record],
+    study: Study,
+    reference: Estimate,
+    selections: Mapping[str, tuple[int, ...]],
+    units: Sequence[str],
+    start: float,
+    *,
+    drives: Drives | None,
+    constants: Mapping[str, float],
+    confirm: bool = True,
+    progress: Callable[[], None] = lambda: None,
+) -> tuple[ReaderAdvice, ...]:
+    """Advice on real encoders read as positions, then as counts.
+
+    reference : estimate of the records as measured, whose deciding parameters decide here.   selections : encoders (from 0) by label.   units : of
+    each encoder.   start : rad or m, a step about which the walk begins.   progress : called after each choice of encoders.
+    """
+    advices = []
+    for reader in READERS:
+        real = RealEncoders(model, records, study, reference.names, drives, constants, reader)
+        curves = _curves(real, selections, start, [reference.names.index(name) for name in deciding_names(reference)])
+        encoders = []
+        for label, own in selections.items():
+            unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
+            advice = _advice(label, *curves[label], reference, unit)
+            if confirm:
+                advice = confirmed(advice, reference, lambda delta, own=own, real=real: real.sampled(reference, own, delta))  # type: ignore[misc]
+            encoders.append(advice)
+            progress()
+        advices.append(ReaderAdvice(reader, tuple(encoders), tuple(part.record.note for part in real.parts if part.record.note)))
+    return tuple(advices)
+
+
+def _curves(
+    real: RealEncoders, selections: Mapping[str, tuple[int, ...]], start: float, decisive: Sequence[int]
+) -> dict[str, tuple[Array, Array]]:
+    """Steps and changes by label: from `start` down until all is below the first limit, up until all is above the last."""
+    known: dict[str, dict[int, Array]] = {label: {} for label in selections}
+    start = min(start, float(real.coarsest.min()))
+    finest = FINER * max((part.record.own.step.max() for part in real.parts if part.record.own is not None), default=0.0)
+    coarsest = real.coarsest
+
+    def evaluate(k: int) -> dict[str, float]:
+        delta = start * RATIO**k
+        moving = [i for i, most in enumerate(coarsest) if delta <= most < np.inf]
+        asked = {label: own for label, own in selections.items() if set(own) <= {*moving, *np.flatnonzero(np.isinf(coarsest))}}
+        if not asked or delta < finest or not moving:
+            return {}
+        nodes = real.nodes(delta, moving)
+        for label, own in asked.items():
+            known[label][k] = real.change(nodes, own)
+        return {label: float(np.abs(known[label][k][decisive]).max(initial=0.0)) for label in asked}
+
+    for step, most, limit in ((-1, DOWN, LIMITS[0]), (1, UP, LIMITS[-1])):
+        for k in range(0 if step < 0 else 1, most):
+            worst = evaluate(step * k)
+            if not worst or (max(worst.values()) < limit if step < 0 else min(worst.values()) > limit):
+                break
+    if not any(known.values()):
+        raise InputError(f"no step between {finest:.3g} and {np.min(coarsest):.3g} can be judged on these records; record a larger motion")
+    order = {label: sorted(own) for label, own in known.items()}
+    b = len(real.names)
+    return {
+        label: (start * RATIO ** np.array(ks, dtype=float), np.array([known[label][k] for k in ks]).reshape(len(ks), b))
+        for label, ks in order.items()
+    }
+
+
+def _advice(label: str, delta: Array, change: Array, reference: Estimate, unit: str) -> EncoderAdvice:
+    """Limits where the first parameter that matters crosses them; nan where the finest step is already beyond, inf where no step is."""
+    names = deciding_names(reference)
+    limits = []
+    for percent in LIMITS:
+        first = {name: crossing(delta, np.abs(change[:, reference.names.index(name)]), percent) for name in names}
+        beyond = [name for name in names if len(change) and abs(change[0, reference.names.index(name)]) > percent]
+        reached = {name: step for name, step in first.items() if np.isfinite(step)}
+        if beyond:
+            worst = max(beyond, key=lambda name: abs(change[0, reference.names.index(name)]))
+            limits.append(Limit(percent, np.nan, worst))
+        elif reached:
+            name = min(reached, key=lambda name: reached[name])
+            limits.append(Limit(percent, reached[name], name))
+        else:
+            limits.append(Limit(percent, np.inf, ""))
+    return EncoderAdvice(label, tuple(limits), delta, change, unit=unit)
+
+
+def _three(states: States) -> tuple[Array, Array, Array]:
+    return states.q, states.qd, states.qdd
