@@ -14,18 +14,22 @@ from symgen.cli.session import reported_errors, say, single_thread
 
 
 class Demo(StrEnum):
-    """Robots of the chapter."""
+    """Robots of the chapter, and coarse encoders."""
 
     tx40 = "tx40"
     haptic = "haptic"
+    counts = "counts"
 
 
 def demo(
-    robot: Annotated[Demo, typer.Argument(help="The robot of the chapter that is shown.")] = Demo.tx40,
+    robot: Annotated[Demo, typer.Argument(help="The robot of the chapter that is shown; counts: coarse encoders of the TX40.")] = Demo.tx40,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")] = Path("symgen-demo"),
     quick: Annotated[bool, typer.Option("--quick", help="Two runs per step and no further studies.")] = False,
 ) -> None:
-    """Identify the Stäubli TX40 (or the haptic interface, simulated) and judge its encoder resolution, beside the published tables."""
+    """Identify the Stäubli TX40 (or the haptic interface, simulated) and judge its encoder resolution, beside the published tables.
+
+    counts: the same TX40 record with encoders of 5000 to 100 counts a turn, read as positions and read as counts.
+    """
     single_thread()
     with reported_errors(), reserved(output) as results:
         module = import_module(f"symgen.demo.{robot}")

@@ -68,7 +68,7 @@ def test_bad_options(emps_data, options, words):
 
 
 def test_advice(emps_data, tmp_path):
-    result = run("emps", "emps", "--advise", "--runs", 4, "-o", tmp_path)
+    result = run("emps", "emps", "--advise", "--rounding", "two-point", "--runs", 4, "-o", tmp_path)
     assert result.exit_code == 0, result.output
     assert "least squares changes by less than 1 % up to Delta = 4.59e-06 m at the joints (M1R first; 4 runs there gave" in result.stdout
     assert {p.name for p in tmp_path.iterdir()} == {"report.html", "advice.json", "study.yaml", "advice.png", "advice.svg"}
@@ -76,7 +76,9 @@ def test_advice(emps_data, tmp_path):
 
 
 def test_advice_judges_the_steps_asked_for(emps_data):
-    fine, coarse = (run("emps", "emps", "--advise", "--runs", 4, "--delta", step, "--json") for step in ("1e-6", "1e-4"))
+    fine, coarse = (
+        run("emps", "emps", "--advise", "--rounding", "two-point", "--runs", 4, "--delta", step, "--json") for step in ("1e-6", "1e-4")
+    )
     assert (fine.exit_code, coarse.exit_code) == (0, 1)
     assert json.loads(coarse.stdout)["asked"][0]["worst"][0] == "M1R"
     refused = run("emps", "emps", "--advise", "--runs", 4, "--delta", "x")
