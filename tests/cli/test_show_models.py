@@ -1,0 +1,51 @@
+"""`symgen show ROBOT --model`: formats, frames, forms, values; bad input is one sentence and exit code 2."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from symgen.cli.main import app
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["show", *arguments])
+
+
+def test_model_as_text():
+    result = run("planar_2r", "--model", "gravity")
+    assert result.exit_code == 0 and "Q(2) = g*C12*MX2 - g*S12*MY2 + OFFSET2" in result.stdout
+
+
+def test_frames_values_forms_and_formats():
+    assert "J(vy,1) = D2" in run("planar_2r", "--model", "jacobian", "--of", "2", "--frame", "1").stdout
+    assert "det J = D2*C1" in run("planar_2r", "--model", "determinant", "--rows", "2,6").stdout
+    assert "A(1,2) = ZZ2 - 1/2*MY2" in run("planar_2r", "--model", "inertia_matrix", "--value", "q2=pi/2", "--value", "D2=0.5").stdout
+    listed = run("planar_2r", "--model", "inverse_dynamics", "--form", "recursive", "--parameters", "standard").stdout
+    assert "  W32 = QP1 + QP2" in listed and "28 standard parameters" in listed
+    assert run("planar_2r", "--model", "pose", "--format", "latex").stdout.startswith("\\documentclass")
+    assert "A = Matrix([" in run("planar_2r", "--model", "inertia_matrix", "--format", "sympy").stdout
+    assert json.loads(run("planar_2r", "--model", "friction", "--json").stdout)["entries"]["F(1)"] == "QP1*FV1 + sign(QP1)*FS1"
+    assert "kept as a symbol" in run("sr400", "--model", "gravity", "--passive", "symbols", "--parameters", "standard").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("tx40", "--model", "jacobian", "--of", "9"), "tx40 has frames 0 to 6"),
+        (("tx40", "--model", "mass_matrix"), "expected one of pose, jacobian"),
+        (("four_bar", "--model", "coriolis"), "bias has C qd"),
+        (("panda", "--model", "inverse_dynamics"), "form recursive"),
+        (("tx40", "--model", "gravity", "--value", "q2"), "--value q3=pi/2"),
+        (("tx40", "--model", "gravity", "--value", "q9=1"), "is no symbol"),
+        (("tx40", "--model", "determinant", "--rows", "a"), "--rows 1,2"),
+        (("tx40", "--model", "gravity", "--form", "open"), "expected one of closed, recursive"),
+        (("tx40", "--model", "gravity", "--only", "MX2R"), "--form recursive"),
+        (("tx40", "--model", "gravity", "--html"), "--html shows everything"),
+        (("tx40", "--frame", "2"), "need --model"),
+        (("tx40", "--format", "sympy"), "need --model"),
+    ],
+)
+def test_bad_input(arguments, told):
+    result = run(*arguments)
+    assert result.exit_code == 2 and told in result.stderr and result.stderr.count("\n") == 1 and not result.stdout
