@@ -2,7 +2,8 @@
 
     X = argmin sum_j ||y_j - y_s,j(X)||^2 / s_j^2,    y decimated position (CLOE) or torque (CLIE), y_s that of the simulation with X
 
-Gauss-Newton with Levenberg's damping on D^-1 X, D = max(|X^0|, sigma of least squares); J = dy_s/dX from the tangent system of the loop, g = 1.
+Gauss-Newton in a trust region (`scipy.optimize.least_squares`) on D^-1 X, D = max(|X^0|, sigma of least squares); J = dy_s/dX from the tangent
+system of the loop, g = 1.
 s_j is the deviation of the residual: found at the start, found again at the first minimum, from where the search goes on once more.
 C = s^2 (J'VJ)^-1. A loop that holds its position well makes J small: slow, dependent on its start, and the first to fail where the simulation
 does not know what the encoder did to the loop.
@@ -13,10 +14,11 @@ Reference: Landau, Anderson and De Bruyne (2001) for output error in closed loop
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from runtime.errors import InputError
 from runtime.estimators import iv, ols
@@ -25,13 +27,12 @@ from runtime.estimators.closed_loop import ClosedLoop, loop_of
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.fixed_point import Array, full, initial
 from runtime.estimators.linear import assemble, columns_asked, outcome, standard_deviations
+from runtime.estimators.simulated_motion import judged
 from runtime.model.generated import GeneratedModel
 from runtime.observation.system import Observation, split_rows
+from runtime.progress import at
 from runtime.settings.schema import Count, Positive, Real, Settings, structure
 from runtime.settings.study import EstimateSettings
-
-DAMPING = 1e-3  # of the diagonal of the scaled J'J, at the start
-RISE, FALL = 5.0, 0.3
 
 
 class CloeOptions(Settings):
@@ -44,9 +45,9 @@ class CloeOptions(Settings):
     start : str
         First parameters: iv, ols, or values of the robot file.
     passes : int
-        Largest number of passes of each of two searches.
+        Largest number of simulations of each of two searches.
     step : float
-        Largest |dX/D| at which a search ends.
+        Length of a step, of that of X in units of D, at which a search ends.
     decrease : float
         Relative decrease of the criterion at which a search ends.
     reference : str
@@ -62,19 +63,6 @@ class CloeOptions(Settings):
     decrease: Positive = 1e-6
     reference: Literal["known", "measured"] = "known"
     around: Real = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """X of the columns with the residual e (r,), and J (r, c) where it was asked for."""
-
-    X: Array
-    e: Array
-    J: Array | None = None
-
-    def criterion(self, weights: Array) -> float:
-        """||V^1/2 e||^2."""
-        return float(np.sum((weights * self.e) ** 2))
 
 
 def cloe(
@@ -98,28 +86,29 @@ def cloe(
     D = np.maximum(np.abs(X), np.sqrt(np.diag(standard_deviations(base, first)[1])))
     y = _measured(loop, observation, options.output)
     trail: list[dict[str, Any]] = []
-    point = _at(loop, observation, X, y, options.output)
+    e = y - _simulated(loop, observation, X, options.output)
     converged = True
     for _ in range(2):
-        weights = 1 / np.repeat(_deviations(point.e, observation), observation.rows)
-        point, converged = _searched(loop, observation, point, y, D, weights, options, trail)
-    point = _at(loop, observation, point.X, y, options.output, slope=True)
-    assert point.J is not None
-    weights = 1 / np.repeat(_deviations(point.e, observation), observation.rows)
-    T = np.linalg.inv(np.linalg.qr(point.J * weights[:, None] * D, mode="r")) * D[:, None]
-    r, c = point.J.shape
-    C = T @ T.T * point.criterion(weights) / max(r - c, 1)
-    C_b = block_covariance(split_rows(np.column_stack([point.J, point.e]) * weights[:, None], observation.blocks()), np.zeros(c), T)
-    estimate = assemble(
-        replace(base, settings=settings, iterations=len(trail)), replace(first, X=point.X), model=model, provenance=provenance
-    )
+        weights = 1 / np.repeat(_deviations(e, observation), observation.rows)
+        X, converged = _searched(loop, observation, X, y, D, weights, options, trail)
+        e = y - _simulated(loop, observation, X, options.output)
+    J = _slope(loop, observation, X, options.output)
+    weights = 1 / np.repeat(_deviations(e, observation), observation.rows)
+    T = np.linalg.inv(np.linalg.qr(J * weights[:, None] * D, mode="r")) * D[:, None]
+    r, c = J.shape
+    C = T @ T.T * float(np.sum((weights * e) ** 2)) / max(r - c, 1)
+    C_b = block_covariance(split_rows(np.column_stack([J, e]) * weights[:, None], observation.blocks()), np.zeros(c), T)
+    estimate = assemble(replace(base, settings=settings, iterations=len(trail)), replace(first, X=X), model=model, provenance=provenance)
     status, message = outcome(base, first)
-    parts = [message, loop.assumption]
+    apart, note, motion = judged(loop, observation, full(observation.names, X, loop.model.BASE_PARAMETERS))
+    parts = [message, loop.assumption, note]
     if not converged:
-        status = "not-converged" if status == "ok" else status
-        parts.append(
-            f"The search has not converged after {len(trail)} steps. Output error depends on its start: start from iv, raise passes, or take didim."
+        parts.insert(
+            0,
+            f"CLOE has not converged after {len(trail)} simulations. Output error depends on its start: start from iv, raise passes, or take didim.",
         )
+    if status == "ok":
+        status = apart if converged else "not-converged"
     return replace(
         estimate,
         covariance=C,
@@ -127,7 +116,7 @@ def cloe(
         sigma_corrected=np.sqrt(np.diag(C_b)),
         status=status,
         message=" ".join(part for part in parts if part),
-        details={"output": options.output, "output_error": _relative(point.e, y, observation), "trail": trail},
+        details={"output": options.output, "output_error": _relative(e, y, observation), "trail": trail, **motion},
     )
 
 
@@ -142,54 +131,54 @@ def _measured(loop: ClosedLoop, observation: Observation, output: str) -> Array:
     return loop.outputs([part.record.q for part in loop.parts], observation) if output == "position" else observation.Y
 
 
-def _at(loop: ClosedLoop, observation: Observation, X: Array, y: Array, output: str, *, slope: bool = False) -> Point:
-    """The residual at X, and its slope."""
-    every = full(observation.names, X, loop.model.BASE_PARAMETERS)
-    label = "q" if output == "position" else "tau"
-    if not slope:
-        return Point(X, y - loop.outputs([getattr(run, label) for run in loop.run(every)], observation))
-    runs = loop.sensitivity(every)
-    numbers = [loop.model.BASE_PARAMETERS.index(name) for name in observation.names]
-    e = y - loop.outputs([getattr(run, label) for run, _ in runs], observation)
-    return Point(X, e, loop.outputs([getattr(tangent, label)[:, :, numbers] for _, tangent in runs], observation))
+def _simulated(loop: ClosedLoop, observation: Observation, X: Array, output: str) -> Array:
+    """y_s of the parameters X of the columns, shape (r,)."""
+    runs = loop.run(full(observation.names, X, loop.model.BASE_PARAMETERS))
+    return loop.outputs([run.q if output == "position" else run.tau for run in runs], observation)
+
+
+def _slope(loop: ClosedLoop, observation: Observation, X: Array, output: str) -> Array:
+    """J = dy_s/dX, shape (r, c)."""
+    every = loop.model.BASE_PARAMETERS
+    numbers = [every.index(name) for name in observation.names]
+    tangents = [tangent for _, tangent in loop.sensitivity(full(observation.names, X, every))]
+    signals = [np.asarray(getattr(tangent, "q" if output == "position" else "tau")) for tangent in tangents]
+    return loop.outputs([x[:, :, numbers] for x in signals], observation)
+    return slope
 
 
 def _searched(
     loop: ClosedLoop,
     observation: Observation,
-    point: Point,
+    X: Array,
     y: Array,
     D: Array,
     weights: Array,
     options: CloeOptions,
     trail: list[dict[str, Any]],
-) -> tuple[Point, bool]:
-    """Levenberg's steps down to a minimum of the weighted criterion."""
-    damping = DAMPING
-    for _ in range(options.passes):
-        if point.J is None:
-            point = _at(loop, observation, point.X, y, options.output, slope=True)
-        assert point.J is not None
-        A = point.J * weights[:, None] * D
-        before = point.criterion(weights)
-        size = np.sqrt(np.mean(np.sum(A**2, axis=0)))
-        damped = np.vstack([A, np.sqrt(damping) * size * np.eye(A.shape[1])])
-        d = np.linalg.lstsq(damped, np.concatenate([point.e * weights, np.zeros(A.shape[1])]), rcond=None)[0]
+) -> tuple[Array, bool]:
+    """X at a minimum of the weighted criterion near X, and whether the search has converged; parameters without a loop are no point of it."""
+
+    def residual(X: Array) -> Array:
+        at(f"simulation {len(trail) + 1}" + (f", criterion {trail[-1]['criterion']:.4g}" if trail else ""))
         try:
-            tried = _at(loop, observation, point.X + D * d, y, options.output)
-            after = tried.criterion(weights)
-        except InputError:  # no loop with these parameters: a smaller step
-            after = np.inf
-        trail.append({"X": (point.X + D * d).tolist(), "criterion": after, "damping": damping})
-        if after < before:
-            point, damping = tried, damping * FALL
-            if before - after <= options.decrease * before:
-                return point, True
-        else:
-            damping *= RISE
-        if float(np.max(np.abs(d))) < options.step:
-            return point, True
-    return point, False
+            e: Array = weights * (_simulated(loop, observation, X, options.output) - y)
+        except InputError:  # no loop with these parameters: least_squares shortens its step
+            e = np.full(len(y), np.nan)
+        trail.append({"X": X.tolist(), "criterion": float(e @ e)})
+        return e
+
+    found = least_squares(
+        residual,
+        X,
+        jac=lambda X: weights[:, None] * _slope(loop, observation, X, options.output),
+        x_scale=D,
+        ftol=options.decrease,
+        xtol=options.step,
+        gtol=None,
+        max_nfev=options.passes,
+    )
+    return np.asarray(found.x), bool(found.success)
 
 
 def _deviations(e: Array, observation: Observation) -> Array:

@@ -18,8 +18,9 @@ from typing import Any
 from runtime.estimators import wls
 from runtime.estimators.closed_loop import SimulatedRun, loop_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.fixed_point import Array, Step, iterate, options_of, outcome_of, trail_of
+from runtime.estimators.fixed_point import Array, Step, full, iterate, options_of, outcome_of, trail_of
 from runtime.estimators.linear import System, assemble, columns_asked, standard_deviations
+from runtime.estimators.simulated_motion import judged
 from runtime.model.generated import GeneratedModel
 from runtime.observation.system import Observation
 from runtime.settings.study import EstimateSettings
@@ -32,7 +33,7 @@ def didim(
     model: GeneratedModel | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """The Estimate; `details`: trail of the passes, contraction. SettingsError where no loop is attached to the observation."""
+    """The Estimate; `details`: trail of the passes, contraction, `motion` simulated beside measured. SettingsError where no loop is attached to the observation."""
     loop, options = loop_of(observation, "didim"), options_of(settings)
     observation = observation.columns(columns_asked(observation, settings))
 
@@ -44,11 +45,13 @@ def didim(
 
     fixed = iterate(loop, observation, options, update)
     status, message = outcome_of(loop, fixed, options, "DIDIM")
+    apart, note, motion = judged(loop, observation, full(observation.names, fixed.step.X, loop.model.BASE_PARAMETERS))
+    status = status if status != "ok" else apart
     system: System = fixed.step.kept
     estimate = assemble(replace(system, settings=settings, iterations=len(fixed.trail)), system.solve(), model=model, provenance=provenance)
     return replace(
         estimate,
         status=status if estimate.status == "ok" else estimate.status,
-        message=" ".join(part for part in (estimate.message, message) if part),
-        details={"trail": trail_of(fixed), "contraction": fixed.contraction},
+        message=" ".join(part for part in (estimate.message, message, note) if part),
+        details={"trail": trail_of(fixed), "contraction": fixed.contraction, **motion},
     )

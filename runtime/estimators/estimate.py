@@ -30,7 +30,9 @@ SCHEMA = "symgen-estimate/1"
 """Kind and version of the JSON layout, published as runtime/schemas/estimate.schema.json (`symgen schema --of estimate`)."""
 
 
-Status = Literal["ok", "rank-deficient", "no-redundancy", "singular-weights", "ill-posed", "not-converged", "weak-instruments"]
+Status = Literal[
+    "ok", "rank-deficient", "no-redundancy", "singular-weights", "ill-posed", "not-converged", "weak-instruments", "simulation-apart"
+]
 """Outcome of an estimator; the message of the Estimate explains."""
 
 

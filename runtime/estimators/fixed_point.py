@@ -21,6 +21,7 @@ from runtime.estimators import ols
 from runtime.estimators.closed_loop import ClosedLoop, SimulatedRun
 from runtime.estimators.estimate import Status
 from runtime.observation.system import Observation
+from runtime.progress import at
 from runtime.settings.schema import Count, Positive, Real, Settings, structure
 from runtime.settings.study import EstimateSettings
 
@@ -148,6 +149,7 @@ def iterate(
         points: list[Array] = []
         steps: list[Array] = []
         for _ in range(options.passes):
+            at(f"pass {len(trail) + 1}" + (f", largest change {trail[-1]['change']:.2g} deviations" if trail else ""))
             X, g, runs, message = _simulated(loop, names, every, X, trail[-1]["X"] if trail else None, J if rescaled else None)
             if step is not None and message:
                 return Fixed(step, tuple(trail), False, _contraction(changes), message)

@@ -28,8 +28,9 @@ from runtime.estimators import ols, wls
 from runtime.estimators.block_covariance import deletions
 from runtime.estimators.closed_loop import SimulatedRun, loop_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.fixed_point import Array, Step, iterate, options_of, outcome_of, trail_of
+from runtime.estimators.fixed_point import Array, Step, full, iterate, options_of, outcome_of, trail_of
 from runtime.estimators.linear import assemble, columns_asked, outcome
+from runtime.estimators.simulated_motion import judged
 from runtime.model.generated import GeneratedModel
 from runtime.observation.system import Observation, split_rows
 from runtime.settings.study import EstimateSettings
@@ -78,6 +79,8 @@ def iv(
             "Likely causes: another time base, reference or controller than those of the record; slow rows; parameters without excitation."
         )
         message = f"{weak} {message}".strip()
+    apart, note, motion = judged(loop, observation, full(names, X, loop.model.BASE_PARAMETERS))
+    status, message = status if status != "ok" else apart, f"{message} {note}".strip()
     weighted = replace(base, settings=settings, weighted=base.raw.weighted(1 / s), scales=tuple(s.tolist()), known_variance=True)
     least = weighted.solve()
     first_outcome = outcome(weighted, least)
@@ -97,6 +100,7 @@ def iv(
             "trail": trail_of(fixed),
             "contraction": fixed.contraction,
             **quality,
+            **motion,
             "hausman": hausman(names, X - least.X, U - U_least),
         },
     )
