@@ -144,7 +144,6 @@ def _slope(loop: ClosedLoop, observation: Observation, X: Array, output: str) ->
     tangents = [tangent for _, tangent in loop.sensitivity(full(observation.names, X, every))]
     signals = [np.asarray(getattr(tangent, "q" if output == "position" else "tau")) for tangent in tangents]
     return loop.outputs([x[:, :, numbers] for x in signals], observation)
-    return slope
 
 
 def _searched(

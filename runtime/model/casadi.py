@@ -73,7 +73,10 @@ def load_symbolic(
 
 
 def casadi_path(model: GeneratedModel) -> Path:
-    """The CasADi file in the folder of the NumPy module; InputError for a model that has no file."""
+    """The CasADi file that `symgen.model` emits on request, or else the one in the folder of the NumPy module; InputError for a model that has no file."""
+    emitted = getattr(model, "casadi_file", None)
+    if emitted is not None:
+        return Path(emitted())
     file = getattr(model, "__file__", None)
     if file is None:
         raise InputError(f"{model.NAME} has no file to look beside for its CasADi module; pass it as `symbolic`")

@@ -118,7 +118,10 @@ def model(robot: str | Path | Robot, *, target: str = "numpy") -> ModuleType:
     if path is None:  # what lies in the cache has been certified
         require_valid(certify(regrouping, text if target == "numpy" else None))
         path = stored_path(file, text)
-    return imported(path)
+    module = imported(path)
+    if target == "numpy":  # runtime asks for it where it simulates
+        vars(module)["casadi_file"] = lambda: str(model(robot, target="casadi").__file__)
+    return module
 
 
 def module_errors(module: ModuleType, regrouping: Regrouping) -> dict[str, float]:
