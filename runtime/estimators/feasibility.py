@@ -16,6 +16,7 @@ import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.semidefinite import FURTHEST, Distance, LinearBounds, Optimum, Prior, closest, margin, solutions
+from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import INERTIAL, PhysicalModel
 from runtime.settings.schema import Positive, Real, Settings, Text
 
@@ -23,7 +24,10 @@ Array = np.ndarray
 Bounds = tuple[Real | None, Real | None]
 
 LEAST = 1e-6  # smallest eigenvalue, SI, that standard parameters keep where there is room
+FLAT = 1e-3  # of the second moments of a link: less than that is a point, a line or a plane
 ROUNDING = 1e-9  # t* above -ROUNDING is zero to the accuracy of the solver
+WATER = 1000.0  # kg/m^3; arms have a fifth of it in the cube of their reach
+POSES = 200  # random, in which the size of a robot is looked for
 TYPICAL = {"X": 0.1, "Y": 0.1, "Z": 0.1, "MX": 0.3, "MY": 0.3, "MZ": 0.3, "M": 3.0}  # kg m^2, kg m, kg; scales of the unknowns only
 
 
@@ -152,6 +156,43 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
     return LinearBounds(tuple(entry[0] for entry in entries), A, lower, upper)
 
 
+def reach_of(model: GeneratedModel) -> float:
+    """Size of a robot, m: the largest distance between two of its frames in random poses, and once more the longest link, whose end no frame marks.
+
+    Revolute joints turn anywhere, prismatic ones move within their limits, 1 m where they have none. nan where the frames say nothing.
+    """
+    poses = getattr(model, "frame_poses", None)
+    if poses is None:
+        return float("nan")
+    n, limits = len(model.JOINTS), dict(getattr(model, "LIMITS", None) or {}).get("q")
+    spans = (
+        np.tile([-np.pi, np.pi], (n, 1)) if limits is None else np.array([(-x, x) if np.ndim(x) == 0 else x for x in limits], dtype=float)
+    )
+    q = np.random.default_rng(0).uniform(spans[:, 0], spans[:, 1], (POSES, n))
+    origins = np.asarray(poses(q))[:, :, :3, 3]
+    links = np.linalg.norm(np.diff(origins, axis=1), axis=2)
+    spread = np.linalg.norm(origins[:, :, None] - origins[:, None], axis=3)
+    return float(spread.max() + links.max()) if links.size and spread.max() > 0 else float("nan")
+
+
+def plausible(physical: PhysicalModel, limits: RobotLimits, reach: float) -> RobotLimits:
+    """The limits with those that the size of a robot, m, sets where nothing is said about its masses.
+
+    No centre of mass lies further from the origin of its frame, along any axis, and all links together weigh less than water in a cube of that side.
+    """
+    if not np.isfinite(reach):
+        return limits
+    box = ((-reach, reach),) * 3
+    said = limits.total_mass is not None or any(name in limits.bounds for name in (f"M{j}" for j in physical.links))
+    own = {str(j): box for j in physical.links if str(j) not in limits.ellipsoid}
+    return RobotLimits(
+        bounds=limits.bounds,
+        total_mass=limits.total_mass if said else (0.0, WATER * reach**3),
+        centre={**own, **limits.centre},
+        ellipsoid=limits.ellipsoid,
+    )
+
+
 def scales(physical: PhysicalModel) -> Array:
     """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones where it has none or zero."""
     sizes = []
@@ -167,18 +208,40 @@ def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | No
     """The pull to the values of the robot file; InputError where they are missing or not those of a body."""
     if kind == "none" or weight == 0:
         return None
-    numbers = tuple(k for j in physical.links for k in physical.link(j))
-    missing = [physical.standard[k] for k in numbers if physical.standard[k] not in physical.values]
-    if missing:
-        raise SettingsError(
-            f"the robot file has no values of {', '.join(missing)}; give them, or use prior: none", path=("estimate", "options", "prior")
-        )
+    numbers = known_inertia(physical)
+    if not numbers:
+        raise SettingsError("the robot file has no values of links; give them, or use prior: none", path=("estimate", "options", "prior"))
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
-    flat = [c.name for c in physical.conditions if c.name.startswith("link ") and c.smallest(chi0) <= 0]
-    if flat and kind != "euclidean":
-        message = f"{kind} needs positive definite pseudo-inertias; the values of {', '.join(flat)} have none. Use prior: euclidean"
-        raise SettingsError(message, path=("estimate", "options", "prior"))
+    if kind != "euclidean":
+        numbers = tuple(k for j in physical.links for k in physical.link(j))
+        if missing := [physical.standard[k] for k in numbers if physical.standard[k] not in physical.values]:
+            message = f"{kind} needs all values of every link; the robot file has none of {', '.join(missing)}. Use prior: euclidean"
+            raise SettingsError(message, path=("estimate", "options", "prior"))
+        chi0 = with_volume(physical, chi0)
     return Prior(kind, chi0, scales(physical), numbers, weight)
+
+
+def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
+    """Numbers of the inertial parameters of links that the robot file has values of."""
+    return tuple(k for j in physical.links for k in physical.link(j) if physical.standard[k] in physical.values)
+
+
+def with_volume(physical: PhysicalModel, chi: Array) -> Array:
+    """chi with every point, line and plane of mass made a body: its pseudo-inertia gets a share of the largest second moment (1 g m^2 at least) and of 1 g.
+
+    SettingsError where a link is no body at all, its pseudo-inertia indefinite.
+    """
+    chi = chi.copy()
+    for c in (c for c in physical.conditions if c.name.startswith("link ")):
+        P = c.matrix(chi)
+        size = max(float(np.trace(P[:3, :3])), 1e-3)
+        if c.smallest(chi) < -FLAT * max(size, P[3, 3]):
+            message = f"the values of {c.name} are those of no body: its pseudo-inertia has the eigenvalue {c.smallest(chi):.3g}; correct them, or use prior: euclidean"
+            raise SettingsError(message, path=("estimate", "options", "prior"))
+        if c.smallest(chi) < FLAT * size:
+            body = np.diag([FLAT * size] * 3 + [FLAT])  # of a pseudo-inertia: second moments, then the mass
+            chi[list(c.numbers)] += np.linalg.lstsq(c.B.reshape(len(c.B), -1).T, body.ravel(), rcond=None)[0]
+    return chi
 
 
 def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], Optimum]) -> str:

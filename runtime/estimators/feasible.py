@@ -9,11 +9,16 @@ are free to make a robot of them. `weights` weighs the rows as for ols ("none") 
 
 options (all of `runtime.estimators.feasibility.RobotLimits` too):
     margin     smallest eigenvalue of every condition, SI; 1e-6
-    prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from the values of the robot file
-    weight     of D, a number; "auto": the largest, to half a decade, that raises the residual norm by at most 1 %; "held-out": that by which
-               the two halves of the record in time predict each other best
+    prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from the values of the robot file; "auto": euclidean
+               where it has values of links, else none
+    weight     of D, a number; "held-out": that by which four fifths of the record in time predict the fifth that is left out best; "auto": the
+               largest, to half a decade, that raises the residual norm by at most 1 %
+    reach      size of the robot, m, which bounds masses and their centres (`runtime.estimators.feasibility.plausible`); "auto": from its frames; null
     bootstrap  resampled records (blocks of time) behind `sigma_corrected`, 0 for none; seed
     linear     options of the least squares behind it: rank_tolerance, block
+
+`details.masses` holds, for every link, the smallest and largest mass of the physical robots whose residual is at most 1 % larger: what the record says
+of it, the prior aside. A mass of which it says little is no value to use by itself.
 
 sigma and covariance are those of least squares without conditions, eq. (10): the theory of estimates on the boundary of a cone has no such
 formula. `sigma_corrected` is the scatter of the bootstrap, conditions included. A parameter held by an active condition is told by `details`.
@@ -35,18 +40,33 @@ from runtime.errors import InputError
 from runtime.estimators import wls
 from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.feasibility import RobotLimits, feasibility, limit_rows, nearest_standard, pulled, scales, unsolved
+from runtime.estimators.feasibility import (
+    RobotLimits,
+    feasibility,
+    known_inertia,
+    limit_rows,
+    nearest_standard,
+    plausible,
+    pulled,
+    reach_of,
+    scales,
+    unsolved,
+)
 from runtime.estimators.linear import System, assemble
-from runtime.estimators.semidefinite import Distance, LinearBounds, Optimum, closest, everything
+from runtime.estimators.semidefinite import Distance, LinearBounds, Optimum, closest, everything, extreme
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import PhysicalModel, physical_model
 from runtime.observation.qr_factor import Array, Factor, factor
 from runtime.observation.system import Observation
+from runtime.progress import at
 from runtime.settings.schema import NotNegative, Positive, Resamples, Seed, require, structure
 from runtime.settings.study import EstimateSettings
 
 INCREASE = 1.01  # of the residual norm that weight: auto allows
 WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)
+DECADES = WEIGHTS[::2]  # of the search for the weight of smallest held-out error
+PARTS = 5  # of the record in time, each left out once
+DETERMINED = 30.0  # %, half the range of a mass, of its middle: above, the record does not determine it
 ACTIVE = 2.0  # a condition within this factor of the margin is active
 
 
@@ -58,10 +78,14 @@ class FeasibleOptions(RobotLimits):
     margin : float, SI
         Smallest eigenvalue of every condition.
     prior : str
-        Distance D of the inertial parameters from the values of the robot file: none, euclidean, entropic or pullback.
+        Distance D of the inertial parameters from the values of the robot file: none, euclidean, entropic or pullback; auto: euclidean where the
+        file has values of links, else none.
     weight : float or str
-        Weight of D; auto: the largest, to half a decade, that raises the residual norm by at most 1 %; held-out: that by which the two
-        halves of the record in time predict each other best.
+        Weight of D; held-out: that by which four fifths of the record in time predict the fifth that is left out best; auto: the largest, to half
+        a decade, that raises the residual norm by at most 1 %.
+    reach : float, str or None, m
+        Size of the robot: no centre of mass lies further from the origin of its frame, and all links together weigh less than water in a cube of that
+        side, where `total_mass` and `bounds` say nothing. auto: from its frames; null: no such bounds.
     bootstrap : int
         Resampled records (blocks of time) behind `sigma_corrected`; 0: none.
     seed : int
@@ -71,14 +95,15 @@ class FeasibleOptions(RobotLimits):
     """
 
     margin: Positive = 1e-6
-    prior: Distance = "none"
-    weight: NotNegative | Literal["auto", "held-out"] = "auto"
+    prior: Distance | Literal["auto"] = "auto"
+    weight: NotNegative | Literal["auto", "held-out"] = "held-out"
+    reach: Positive | Literal["auto"] | None = "auto"
     bootstrap: Resamples = 30
     seed: Seed = 1
     linear: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        message = f"{self.weight} without prior; set prior: euclidean, entropic or pullback"
+        message = f"{self.weight} with prior: none; set prior: euclidean, entropic or pullback"
         require(self.prior != "none" or isinstance(self.weight, str), message, "weight")
 
 
@@ -92,17 +117,17 @@ def feasible(
     """The feasible Estimate; `details` holds the standard parameters, the smallest eigenvalues, and what least squares gave."""
     if model is None:
         raise InputError("method feasible needs the model: it knows which parameters belong to one link")
-    options = structure(FeasibleOptions, settings.options, ("estimate", "options"))
     physical = physical_model(model)
+    options = decided(structure(FeasibleOptions, settings.options, ("estimate", "options")), model, physical)
     system = wls.least_squares(observation, settings, options.linear)
     free = system.solve()
     unconstrained = feasibility(physical, system.names, free.X, options)
     if unconstrained.feasible and unconstrained.margin >= options.margin and options.prior == "none":
         X, chi, weight = free.X, unconstrained.chi, 0.0
     else:
-        fixed = (
-            replace(options, weight=held_out_weight(observation, system, physical, options)) if options.weight == "held-out" else options
-        )
+        searched = options.prior != "none" and options.weight == "held-out"
+        fixed = replace(options, weight=held_out_weight(observation, system, physical, options)) if searched else options
+        at(f"feasible, weight of the prior {fixed.weight:g}" if isinstance(fixed.weight, float) else "feasible")
         chi, weight = weighed(system.weighted, physical, fixed)
         X = physical.rows(system.names) @ chi
     if weight == 0:  # nothing was pulled: chi is one of many
@@ -112,12 +137,14 @@ def feasible(
     smallest = physical.smallest(chi)
     active = [name for name, value in smallest.items() if value < ACTIVE * options.margin]
     without = assemble(system, free, model=model)
+    masses = mass_ranges(system.weighted, physical, options, chi)
     details = {
         "standard": physical.named(chi),
         "smallest_eigenvalues": smallest,
         "active": active,
         "options": asdict(options),
         "weight": weight,
+        "masses": masses,
         "least_squares": {
             "method": system.settings.method,
             "feasible": unconstrained.feasible,
@@ -128,7 +155,16 @@ def feasible(
             "X": without.X,
         },
     }
-    message = " ".join(part for part in (estimate.message, difference_text(system, unconstrained.text, active, estimate, without)) if part)
+    message = " ".join(
+        part
+        for part in (
+            estimate.message,
+            difference_text(system, unconstrained.text, active, estimate, without),
+            prior_text(physical, options, weight),
+            masses_text(masses),
+        )
+        if part
+    )
     if min(smallest.values()) < 0:
         estimate = replace(estimate, status="not-converged")
         message += " The solver left a condition violated: try another margin, a prior, or bounds on the masses."
@@ -160,17 +196,71 @@ def held_out_weight(observation: Observation, system: System, physical: Physical
     """The weight of D by which the halves of the record predict each other best."""
     if options.prior == "none":
         return 0.0
-    middle = float(np.median(observation.t))
-    late = observation.t > middle
-    halves = [part_factor(observation.where(mask), system) for mask in (~late, late)]
+    t0, t1 = observation.span
+    number = np.minimum((PARTS * (observation.t - t0) / (t1 - t0)).astype(int), PARTS - 1)
+    parts = [
+        (part_factor(observation.where(number != p), system), part_factor(observation.where(number == p), system))
+        for p in np.unique(number)
+    ]
     K = physical.rows(system.names)
 
     def error(weight: float) -> float:
+        at(f"feasible, held-out error with the prior weighed by {weight:g}")
         fixed = replace(options, weight=weight)
-        fits = [weighed(half, physical, fixed)[0] for half in halves]
-        return float(np.hypot(residual_norm(halves[1], K @ fits[0]), residual_norm(halves[0], K @ fits[1])))
+        return float(np.linalg.norm([residual_norm(left, K @ weighed(kept, physical, fixed)[0]) for kept, left in parts]))
 
-    return min(map(float, (*WEIGHTS, 0.0)), key=error)
+    return min(map(float, (*DECADES, 0.0)), key=error)
+
+
+def decided(options: FeasibleOptions, model: GeneratedModel, physical: PhysicalModel) -> FeasibleOptions:
+    """The options with the prior and the bounds that they leave to the robot."""
+    prior = ("euclidean" if known_inertia(physical) else "none") if options.prior == "auto" else options.prior
+    message = f"{options.weight}, but {model.NAME} has no values of links; give them in the robot file, or leave this out"
+    require(prior != "none" or isinstance(options.weight, str), message, "estimate", "options", "weight")
+    reach = reach_of(model) if options.reach == "auto" else options.reach
+    if reach is not None and np.isfinite(reach):
+        limits = plausible(physical, options, reach)
+        return replace(options, prior=prior, reach=reach, total_mass=limits.total_mass, centre=limits.centre)
+    return replace(options, prior=prior, reach=None)
+
+
+def mass_ranges(rows: Factor, physical: PhysicalModel, options: FeasibleOptions, chi: Array) -> dict[str, dict[str, float | bool]]:
+    """Smallest and largest mass of every link, kg, over the physical robots whose residual is at most INCREASE times that of chi; nan: not found."""
+    K = physical.rows(rows.names)
+    size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
+    allowed = (INCREASE * residual_norm(rows, K @ chi) / size) ** 2 - (rows.r22 / size) ** 2
+    radius = max(float(np.sqrt(max(allowed, 0.0))), 1e-6)
+    bounds, space = limit_rows(physical, options), everything(scales(physical))
+    ranges: dict[str, dict[str, float | bool]] = {}
+    for j in physical.links:
+        place = physical.link(j)[-1]
+        ends = []
+        for sign in (1.0, -1.0):
+            direction = np.zeros(len(physical.standard))
+            direction[place] = sign
+            found = extreme(
+                direction, rows.R11 @ K / size, rows.r12 / size, radius, physical.conditions, bounds, space, least=options.margin / 2
+            )
+            ends.append(float(found.chi[place]) if found.solved else float("nan"))
+        low, high = min(ends[0], chi[place]), max(ends[1], chi[place])
+        determined = all(np.isfinite(ends)) and 100 * (high - low) <= DETERMINED * (high + low)
+        ranges[f"M{j}"] = {"value": float(chi[place]), "lowest": low, "highest": high, "determined": bool(determined)}
+    return ranges
+
+
+def masses_text(masses: Mapping[str, Mapping[str, float | bool]]) -> str:
+    """Which masses the record does not determine, in words."""
+    loose = [f"{name} ({own['lowest']:.3g} to {own['highest']:.3g} kg)" for name, own in masses.items() if not own["determined"]]
+    return f"Masses that this record does not determine, no values to use by themselves: {', '.join(loose)}." if loose else ""
+
+
+def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:
+    """What the values of the robot file did, in words."""
+    if options.prior == "none":
+        return ""
+    missing = len(physical.links) * 10 - len(known_inertia(physical))
+    some = f" ({missing} parameters of links have no value and stay free)" if missing else ""
+    return f"Values of the robot file as prior, {options.prior}, weight {weight:g}{some}."
 
 
 def part_factor(part: Observation, system: System) -> Factor:
@@ -182,7 +272,8 @@ def part_factor(part: Observation, system: System) -> Factor:
 def fitted(R: Array, z: Array, physical: PhysicalModel, options: FeasibleOptions, weight: float = 0.0) -> Array:
     """chi, shape (p,), of min ||R chi - z||^2 + weight D(chi) under the conditions; R (m, p), z (m,), ||z|| about 1."""
     rows, space = limit_rows(physical, options), everything(scales(physical))
-    pull = pulled(physical, options.prior, weight)
+    prior = "none" if options.prior == "auto" else options.prior
+    pull = pulled(physical, prior, weight)
 
     def attempt(within: LinearBounds) -> Optimum:
         return closest(R, z, physical.conditions, within, space, least=options.margin, pull=pull)
@@ -202,6 +293,8 @@ def bootstrapped(observation: Observation, system: System, physical: PhysicalMod
     """Deviation of X, shape (b,), over records of resampled blocks of time; weights of the joints stay."""
     fixed = options if options.prior == "none" else replace(options, weight=weight)
     K, names = physical.rows(system.names), system.names
+
+    at(f"feasible, {options.bootstrap} records of resampled blocks")
 
     def estimator(gram: Array) -> Array:
         return np.asarray(K @ weighed(Factor(names, gram_root(gram), ()), physical, fixed)[0])

@@ -1,6 +1,7 @@
 """Semidefinite programs over the standard parameters, as cone programs for Clarabel.
 
     closest     min ||R chi - z||^2 + weight D(chi)    subject to  P >= least 1 of every condition, rows, chi in a Space
+    extreme     min d'chi                              subject to  the same, ||R chi - z|| <= radius
     margin      max t                                  subject to  P >= t 1 of every condition, rows, chi in a Space
 
 Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of chi = origin + basis w, with sizes near one as
@@ -173,6 +174,13 @@ class Program:
             given = np.isfinite(bound)
             self.at_least_zero(sign * A[given], sign * (b - bound)[given])
 
+    def within_ball(self, M: Array, z: Array, radius: float) -> None:
+        """||M chi - z|| <= radius."""
+        A, b = self.of_chi(M)
+        self.constraints.append(
+            (clarabel.SecondOrderConeT(1 + len(z)), np.vstack([self.unknowns(1), A]), np.concatenate([[radius], b - z]))
+        )
+
     def at_least_zero(self, A: Array, b: Array) -> None:
         """A x + b >= 0, row by row."""
         if len(b):
@@ -264,6 +272,23 @@ def closest(
         first += 14  # Z of a pseudo-inertia, (4, 4), and four logarithms
     status, x, duals = program.solve()
     return Optimum(status, space.origin + space.basis @ x[: program.m], float("nan"), duals)
+
+
+def extreme(
+    direction: Array, R: Array, z: Array, radius: float, conditions: Sequence[Condition], rows: LinearBounds, space: Space, *, least: float
+) -> Optimum:
+    """The chi of `space` with the smallest direction'chi, direction of shape (p,), among those with ||R chi - z|| <= radius; scaled as for `closest`."""
+    space, rows = within(space, rows)
+    program = Program(space, 0)
+    program.linear[:] = direction @ space.basis
+    program.conditions_hold(conditions, least)
+    program.rows_hold(rows)
+    program.within_ball(R, z, radius)
+    bounds = np.full(program.m, LARGEST)
+    program.at_least_zero(-np.eye(program.m), bounds)
+    program.at_least_zero(np.eye(program.m), bounds)
+    status, x, duals = program.solve()
+    return Optimum(status, space.origin + space.basis @ x, float("nan"), duals)
 
 
 def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:

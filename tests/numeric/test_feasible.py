@@ -30,7 +30,8 @@ from runtime.settings.study import EstimateSettings, study_from_mapping
 from symgen.description import load_robot
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
-FEASIBLE = EstimateSettings("feasible", options={"bootstrap": 0})
+PLAIN = {"bootstrap": 0, "prior": "none", "reach": None}  # the conditions alone
+FEASIBLE = EstimateSettings("feasible", options=PLAIN)
 
 
 def emitted(name: str):
@@ -112,7 +113,7 @@ def test_feasible_is_least_squares_where_that_is_feasible(name: str) -> None:
     ols, found = estimate_of(seen), estimate_of(seen, FEASIBLE, model=model)
     assert found.details["least_squares"]["feasible"]
     np.testing.assert_array_equal(found.X, ols.X)
-    physical, options = physical_model(model), FeasibleOptions(margin=1e-9)
+    physical, options = physical_model(model), FeasibleOptions(prior="none", margin=1e-9)
     chi, weight = weighed(least_squares(seen, FEASIBLE, {}).weighted, physical, options)
     assert weight == 0 and np.abs((physical.K @ chi - ols.X) / ols.sigma).max() < 1e-2
 
@@ -130,7 +131,7 @@ def test_optimum_is_that_of_a_parametrisation_of_all_physical_arms(arm) -> None:
     X = arm.base_parameters(arm.VALUES)
     X = X + np.array([0, 0, 0, 0, 0, 0, -0.1, 0, 0, -0.01, -0.35, 0, 0])  # ZZ2 too small for MX2, FV2 below zero
     seen = simulated(arm, X, 0.5, N=60)
-    settings = EstimateSettings("feasible", options={"bootstrap": 0, "total_mass": 4.0, "margin": 1e-9})
+    settings = EstimateSettings("feasible", options={**PLAIN, "total_mass": 4.0, "margin": 1e-9})
     found = estimate_of(seen, settings, model=arm)
     assert found.status == "ok" and not found.details["least_squares"]["feasible"]
     lower = np.tril_indices(4)
@@ -201,10 +202,10 @@ def test_limits_hold(arm) -> None:
     assert weights @ chi == pytest.approx(inside, abs=1e-12)
 
 
-def test_held_out_weight_is_that_of_the_best_mutual_prediction(arm) -> None:
+def test_held_out_weight_is_that_of_the_best_prediction(arm) -> None:
     """Wrong values ask for little pull, right ones for much."""
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 2.0, N=40)
-    options = {"bootstrap": 0, "prior": "euclidean", "weight": "held-out"}
+    options = {"bootstrap": 0, "reach": None}
     right, wrong = replace_values(arm), replace_values(arm)
     wrong.VALUES = {name: 3 * x for name, x in right.VALUES.items()}
     weights = [estimate_of(seen, EstimateSettings("feasible", options=options), model=m).details["weight"] for m in (right, wrong)]
@@ -215,11 +216,11 @@ def test_held_out_weight_is_that_of_the_best_mutual_prediction(arm) -> None:
 def test_a_strong_pull_ends_at_the_values_and_auto_costs_one_per_cent(arm, prior: str) -> None:
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.5)
     solid = replace_values(arm)
-    free = estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0}), model=solid)
-    strong = estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": prior, "weight": 1e4}), model=solid)
+    free = estimate_of(seen, FEASIBLE, model=solid)
+    strong = estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, "prior": prior, "weight": 1e4}), model=solid)
     inertial = [f"{family}{j}" for j in (1, 2) for family in INERTIAL]
     assert max(abs(strong.details["standard"][name] - solid.VALUES[name]) for name in inertial) < 1e-3
-    auto = estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": prior}), model=solid)
+    auto = estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, "prior": prior, "weight": "auto"}), model=solid)
     assert free.residual_norm <= auto.residual_norm <= 1.0101 * free.residual_norm and auto.details["weight"] > 0
 
 
@@ -233,7 +234,7 @@ def replace_values(arm):
 
 def test_bootstrap_is_seeded_and_has_the_size_of_the_scatter(arm) -> None:
     truth = arm.base_parameters(arm.VALUES)
-    settings = EstimateSettings("feasible", options={"bootstrap": 12, "seed": 3})
+    settings = EstimateSettings("feasible", options={**PLAIN, "bootstrap": 12, "seed": 3})
     first, again = (estimate_of(simulated(arm, truth, 0.3), settings, model=arm) for _ in range(2))
     np.testing.assert_array_equal(first.sigma_corrected, again.sigma_corrected)
     runs = np.array([estimate_of(simulated(arm, truth, 0.3, seed), FEASIBLE, model=arm).X for seed in range(20)])
@@ -271,7 +272,7 @@ def test_json_keeps_the_standard_parameters(arm) -> None:
 def test_what_cannot_be_asked(arm, options: dict, said: str) -> None:
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.1)
     with pytest.raises(InputError, match=said):
-        estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0, **options}), model=arm)
+        estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, **options}), model=arm)
 
 
 def test_needs_the_model_and_values_for_a_pull(arm) -> None:
