@@ -30,7 +30,7 @@ Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018); Lee, Wens
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, field, replace
 from typing import Any, Literal
 
@@ -41,6 +41,7 @@ from runtime.estimators import wls
 from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import (
+    Feasibility,
     RobotLimits,
     feasibility,
     known_inertia,
@@ -121,7 +122,7 @@ def feasible(
     options = decided(structure(FeasibleOptions, settings.options, ("estimate", "options")), model, physical)
     system = wls.least_squares(observation, settings, options.linear)
     free = system.solve()
-    unconstrained = feasibility(physical, system.names, free.X, options)
+    unconstrained = within_limits(physical, system.names, free.X, options)
     if unconstrained.feasible and unconstrained.margin >= options.margin and options.prior == "none":
         X, chi, weight = free.X, unconstrained.chi, 0.0
     else:
@@ -170,6 +171,14 @@ def feasible(
         message += " The solver left a condition violated: try another margin, a prior, or bounds on the masses."
     scatter = bootstrapped(observation, system, physical, options, weight) if options.bootstrap else estimate.sigma_corrected
     return replace(estimate, message=message, details=details, sigma_corrected=scatter)
+
+
+def within_limits(physical: PhysicalModel, names: Sequence[str], X: Array, options: FeasibleOptions) -> Feasibility:
+    """Whether X is that of a physical robot within the limits; no where no mass distribution fits into them, whatever its sign."""
+    try:
+        return feasibility(physical, names, X, options)
+    except InputError:
+        return Feasibility(float("nan"), False, (("the bounds of masses and centres", float("nan")),), np.full(len(physical.standard), np.nan))
 
 
 def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> tuple[Array, float]:
