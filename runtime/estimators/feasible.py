@@ -178,7 +178,9 @@ def within_limits(physical: PhysicalModel, names: Sequence[str], X: Array, optio
     try:
         return feasibility(physical, names, X, options)
     except InputError:
-        return Feasibility(float("nan"), False, (("the bounds of masses and centres", float("nan")),), np.full(len(physical.standard), np.nan))
+        return Feasibility(
+            float("nan"), False, (("the bounds of masses and centres", float("nan")),), np.full(len(physical.standard), np.nan)
+        )
 
 
 def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> tuple[Array, float]:

@@ -21,6 +21,7 @@ import numpy as np
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.methods import CLOSED_LOOP
 from runtime.estimators.physical import CERTAIN
+from runtime.identification.homogeneity import LEVEL, Homogeneity
 from runtime.identification.validation import CORRELATION
 from runtime.resolution.advice import Advice, step_text
 from runtime.resolution.result import BIASED, NEGLIGIBLE
@@ -143,6 +144,7 @@ def checklist_of(
     feasibility: Feasibility | None = None,
     advice: Advice | None = None,
     plausible: Sequence[Check] = (),
+    homogeneity: Homogeneity | None = None,
 ) -> Checklist:
     """The checklist of an identification; rank alone where the record does not determine the parameters.
 
@@ -166,11 +168,15 @@ def checklist_of(
         The coarsest encoders, and the step in use.
     plausible : sequence of Check
         Whether record, study and robot file suit each other: what is wrong there is the cause of what follows.
+    homogeneity : Homogeneity, optional
+        Whether several records agree.
     """
     checks = [determined(estimate, fit), *plausible]
     if estimate.status != "rank-deficient":
         checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error)]
-        checks += [signs(negative), certain(fit, bootstrap), separate(fit), physical(estimate, feasibility), resolved(advice)]
+        checks += [] if homogeneity is None else [agreeing(homogeneity)]
+        checks += [signs(negative), certain(fit, bootstrap), separate(fit)]
+        checks += [physical(fit if "standard" in fit.details else estimate, feasibility), resolved(advice)]
     return Checklist(tuple(checks), use)
 
 
@@ -244,6 +250,15 @@ def predicted(fit: Estimate, error: float) -> Check:
         f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
         "fewer parameters (a larger essential.threshold), a longer or richer record",
     )
+
+
+def agreeing(homogeneity: Homogeneity) -> Check:
+    """Whether several records tell the same parameters."""
+    question, limit = "Do the records agree?", f"differences within the stated deviations, p above {LEVEL:g}"
+    if len(homogeneity.records) < 2:
+        return Check(question, "open", homogeneity.text.rstrip("."), limit)
+    remedy = "look at the record that differs: load, temperature, time since the last one; or its motion shows what the model leaves out"
+    return Check(question, "good" if homogeneity.agree else "doubtful", homogeneity.text.rstrip("."), limit, remedy)
 
 
 def signs(negative: Sequence[str]) -> Check:

@@ -187,8 +187,8 @@ class Fleet:
 
     @property
     def complete(self) -> bool:
-        """Whether every job gave parameters that its record determines."""
-        return not any(row.status in (FAILED, "rank-deficient") for row in self.rows)
+        """Whether the estimator of every job ended well."""
+        return all(row.status == "ok" for row in self.rows)
 
     def __str__(self) -> str:
         return self.to_text()

@@ -15,18 +15,22 @@ from typing import TYPE_CHECKING, Any
 from runtime.errors import InputError
 from runtime.estimators.closed_loop import LoopSimulator
 from runtime.estimators.essential import essential_of
+from runtime.estimators.estimate import Estimate
 from runtime.estimators.methods import LINEAR, estimate_of, linear_companion, simulator_of
 from runtime.estimators.methods import observed as method_observation
 from runtime.identification.coupling import coupling_fits
 from runtime.identification.friction import friction_curves
+from runtime.identification.homogeneity import homogeneity
+from runtime.identification.parameter_sets import SetName, best_set, parameter_sets
 from runtime.identification.payload_study import payload_study
 from runtime.identification.plausibility.plausibility import plausibility
 from runtime.identification.result import Identification
 from runtime.identification.uncertainty import uncertainty
-from runtime.identification.validation import cross_validation, direct_comparison, split_validation, weak_directions
+from runtime.identification.validation import direct_comparison, sets_validation, split_sets, weak_directions
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import physical_model
 from runtime.observation.system import halves
+from runtime.progress import at
 from runtime.records.provenance import origin, record_names
 from runtime.records.reading_by_blocks import records_or_streams
 from runtime.records.record import Record
@@ -97,17 +101,33 @@ def identify(
         further = records_or_streams(study.validate.record, model, study.stream)
     observed = partial(method_observation, model, study=study)
     observation = observed(records, simulator=simulator)
+    at("least squares, essential parameters")
     reduced = essential_of(observation, study.essential, linear_companion(study.estimate), model=model, provenance=provenance)
-    linear = study.estimate.method in LINEAR
-    fit = reduced.all_parameters if linear else estimate_of(observation, study.estimate, model=model, provenance=provenance)
+    sets: dict[SetName, Estimate] = {}
+    missing: list[str] = []
+    if study.estimate.method in LINEAR:
+        sets, how, note = parameter_sets(observation, study.estimate, reduced, model=model)
+        fit, missing = reduced.all_parameters, [note] if note else []
+    else:
+        at(study.estimate.method)
+        fit = estimate_of(observation, study.estimate, model=model, provenance=provenance)
+        how = {"all": study.estimate, "essential": replace(study.estimate, columns=reduced.names)}
     windows = study.validate.split or halves(*observation.span)
-    validation = [split_validation(observation, windows, study.estimate, essential=reduced.names, model=model)]
-    if further:
-        names = record_names([*records, *further])
-        fitted, others = ", ".join(names[: len(records)]), names[len(records) :]
-        parts = {name: observed([record], windows=()) for name, record in zip(others, further, strict=True)}
-        validation.append(cross_validation(observation, parts, study.estimate, essential=reduced.names, name=fitted, model=model))
-    comparison = direct_comparison(observation.first_rows, reduced.estimate if linear else fit)
+    names = record_names([*records, *further])
+    fitted, others = ", ".join(names[: len(records)]), names[len(records) :]
+    at("validation")
+    try:
+        validation = [split_sets(observation, windows, how, model=model)]
+    except InputError as e:
+        validation, missing = [], [*missing, f"validation between windows of the record: {e}"]
+    parts = {name: observed([record], windows=()) for name, record in zip(others, further, strict=True)}
+    if parts:
+        known = sets or {"all": fit}
+        validation.append(sets_validation(observation, parts, how, name=fitted, model=model, fitted=known))
+    missing += [text for part in validation for text in part.missing]
+    best = best_set(validation[-1].errors() if validation and sets else {})
+    comparison = direct_comparison(observation.first_rows, sets[best] if sets else fit)
+    each = {name: observation.of_record(k) for k, name in enumerate(names[: len(records)])} if len(names) > 1 else {}
     result = Identification(
         model=model,
         study=study,
@@ -117,6 +137,9 @@ def identify(
         essential=reduced,
         comparison=comparison,
         validation=tuple(validation),
+        sets=sets,
+        homogeneity=homogeneity({**each, **parts}, reduced.names, study.estimate, model=model) if each else None,
+        missing=tuple(missing),
         correlations=weak_directions(observation, study.estimate),
         coupling=coupling_fits(model, records, study, partial(observed, windows=())),
         uncertainty=uncertainty(observation, study.estimate, reduced, comparison),

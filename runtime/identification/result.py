@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,6 +14,8 @@ from runtime.estimators.methods import LINEAR
 from runtime.estimators.physical import negative_elements
 from runtime.identification.checklist import Checklist, checklist_of, lost_joints
 from runtime.identification.friction import FrictionCurve
+from runtime.identification.homogeneity import Homogeneity
+from runtime.identification.parameter_sets import ORDER, SetName, best_set, ranking_text
 from runtime.identification.payload_study import PayloadStudy
 from runtime.identification.plausibility.plausibility import Plausibility
 from runtime.identification.record_errors import RecordError, record_errors
@@ -21,6 +23,7 @@ from runtime.identification.torque_unit import torque_unit_doubt
 from runtime.identification.uncertainty import Uncertainty
 from runtime.identification.validation import Comparison, CrossValidation, WeakDirections
 from runtime.json_documents import json_text
+from runtime.markup import number
 from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import Observation
@@ -75,6 +78,10 @@ class Identification:
         The resolution study at the steps of study.cestac.
     plausibility : Plausibility or None
         Whether record, study and robot file suit each other; None where it was not asked for.
+    sets : mapping of str to Estimate
+        The essential, the feasible and all parameters (`runtime.identification.parameter_sets`); empty where the method of the study is not linear.
+    homogeneity : Homogeneity or None
+        Whether several records, further ones included, agree; None for one record.
     missing : tuple of str
         Parts that were asked for and could not be done, each with its reason.
     """
@@ -96,6 +103,8 @@ class Identification:
     advice: Advice | None = None
     resolution: Cestac | None = None
     plausibility: Plausibility | None = None
+    sets: Mapping[SetName, Estimate] = field(default_factory=dict)
+    homogeneity: Homogeneity | None = None
     missing: tuple[str, ...] = ()
 
     @property
@@ -119,14 +128,32 @@ class Identification:
         return self.estimate.status != "rank-deficient"
 
     @property
-    def model_columns(self) -> Literal["essential", "all"]:
-        """Which parameters stand for the robot: the essential ones, or all where the method of the study is not linear."""
-        return "essential" if self.study.estimate.method in LINEAR else "all"
+    def usable(self) -> bool:
+        """Whether the estimator ended well: status ok."""
+        return self.estimate.status == "ok"
+
+    @property
+    def set_errors(self) -> dict[SetName, float]:
+        """Largest error on unseen data, %, by set of parameters; empty where nothing was predicted."""
+        judged = self.validation[-1].errors() if self.validation else {}
+        return {name: judged[name] for name in ORDER if name in judged}
+
+    @property
+    def unseen(self) -> str:
+        """The data that the sets are judged by, in words: the validation records of the study where it has some, else a part of the records."""
+        parts = dict.fromkeys(p.part for part in self.validation[-1:] for p in part.predictions if not p.fitted)
+        further = len(self.validation) > 1 or not any(part.startswith("[") for part in parts)
+        return f"{', '.join(parts)}" if further else "a part of the record that it has not seen"
+
+    @property
+    def model_columns(self) -> SetName:
+        """Which parameters stand for the robot: the set that predicts unseen data best, or all where the method of the study is not linear."""
+        return best_set(self.set_errors) if self.study.estimate.method in LINEAR else "all"
 
     @property
     def model_estimate(self) -> Estimate:
-        """The estimate that stands for the robot: `essential.estimate`, or `estimate` where the method of the study is not linear."""
-        return self.essential.estimate if self.model_columns == "essential" else self.estimate
+        """The estimate that stands for the robot: that of `model_columns`, or `estimate` where the method of the study is not linear."""
+        return self.sets.get(self.model_columns, self.estimate)
 
     @property
     def torque_unit(self) -> str:
@@ -149,12 +176,8 @@ class Identification:
 
     @property
     def prediction_error(self) -> float:
-        """Largest relative error, %, of `model_estimate` on the parts of the records that did not give it; nan where there are none."""
-        return max(self._prediction_errors(self.validation[:1]), default=float("nan"))
-
-    def _prediction_errors(self, validation: tuple[CrossValidation, ...]) -> list[float]:
-        predictions = (p for part in validation for p in part.predictions)
-        return [p.relative_error for p in predictions if not p.fitted and p.columns == self.model_columns]
+        """Largest relative error, %, of `model_estimate` on the validation records, or else on parts of the records that did not give it; nan: on none."""
+        return self.set_errors.get(self.model_columns, float("nan"))
 
     @property
     def compared_rows(self) -> int:
@@ -168,8 +191,8 @@ class Identification:
 
     @property
     def feasible(self) -> bool:
-        """Whether the estimate was made under the conditions of a physical robot."""
-        return "standard" in self.estimate.details
+        """Whether the parameters that stand for the robot were fitted under the conditions of a physical one."""
+        return "standard" in self.model_estimate.details
 
     @cached_property
     def checklist(self) -> Checklist:
@@ -180,9 +203,10 @@ class Identification:
             self.model_estimate,
             self.verdict,
             bootstrap=dict(zip(drawn.names, drawn.drawn, strict=True)) if self.model_columns == "essential" else {},
-            prediction_error=max(self._prediction_errors(self.validation), default=float("nan")),
+            prediction_error=self.prediction_error,
             negative=self.negative if self.determined else (),
             feasibility=self.feasibility,
+            homogeneity=self.homogeneity,
             advice=self.advice,
             plausible=self.plausibility.checks if self.plausibility is not None else (),
         )
@@ -197,11 +221,14 @@ class Identification:
                 f"parameters, cannot be told apart: {names}."
             )
         fit = self.model_estimate
+        if not self.usable:
+            reason = self.estimate.message.split(". ")[0].rstrip(".")
+            return f"No values of {self.model.NAME}: {self.estimate.method} ended with status {self.estimate.status}. {reason}."
         worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
         by_joint = f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)" if self.observation.n > 1 else ""
         return (
             f"{len(fit.names)} of {len(self.estimate.names)} parameters carry the model of {self.model.NAME}: they leave {fit.relative_error:.1f} % "
-            f"of the torques of the {self._of_record} unexplained{by_joint}, and {self.prediction_error:.1f} % of a part that the fit has not seen."
+            f"of the torques of the {self._of_record} unexplained{by_joint}, and {self.prediction_error:.1f} % of {self.unseen}."
         )
 
     @property
@@ -231,6 +258,11 @@ class Identification:
         ]
         parts = [fit.to_table(), self.essential.to_table(), *(part.to_table() for part in self.validation)]
         parts += ["\n".join([*self._record_lines(), *self.time_stamps]), "\n".join(trade), "\n".join(self._direction_lines())]
+        parts += [
+            self.ranking,
+            self.homogeneity.text if self.homogeneity else "",
+            self.motion_table().to_text() if self.motion_table().rows else "",
+        ]
         parts += [self.uncertainty.to_text(), "\n".join(self._coupling_lines())]
         parts += [self.eigenvalue_table().to_text()] if self.feasible else []
         parts += [] if self.feasibility is None else [f"The parameters are {self.feasibility.text}."]
@@ -241,9 +273,24 @@ class Identification:
         worst = self.plausibility.line if self.plausibility is not None else ""
         return "\n\n".join(part for part in (*parts, *self.missing, worst, self.verdict) if part)
 
+    @property
+    def ranking(self) -> str:
+        """Which set of parameters predicts best, a sentence; "" where there is one set."""
+        return ranking_text(self.set_errors, {name: len(fit.names) for name, fit in self.sets.items()}, self.unseen) if self.sets else ""
+
+    def motion_table(self) -> Table:
+        """Simulated minus measured motion, joint by joint, of a method that simulates the loop; else without rows."""
+        rows = [
+            (m["joint"], f"{m['rms']:.3g}", *(number(m[key], ".3g") for key in ("position", "tracking", "torque")))
+            for m in self.estimate.details.get("motion", ())
+        ]
+        header = ("joint", "rms of q_s - q, rad or m", "of the motion, %", "of the tracking error, %", "torque, %")
+        return Table("Simulated minus measured motion", header, rows)
+
     def eigenvalue_table(self) -> Table:
         """Conditions of a physical robot with the smallest eigenvalue of each, of an estimate that was made under them."""
-        active, eigenvalues = self.estimate.details["active"], self.estimate.details["smallest_eigenvalues"]
+        details = self.model_estimate.details
+        active, eigenvalues = details["active"], details["smallest_eigenvalues"]
         rows = [(name, f"{value:.4e}", "at its limit" if name in active else "") for name, value in eigenvalues.items()]
         return Table("Conditions of a physical robot", ("condition", "smallest eigenvalue", ""), rows)
 
@@ -287,7 +334,14 @@ class Identification:
             "coupling": {key: {"relative_error": e.relative_error, "per_joint": e.per_joint} for key, e in self.coupling.items()},
             **({"by_record": self.record_errors} if self.record_errors else {}),
             "verdict": self.verdict,
+            "sets": [
+                {"name": name, "count": len(fit.names), "relative_error": fit.relative_error, "unseen": self.set_errors.get(name)}
+                for name, fit in self.sets.items()
+            ],
+            "model_columns": self.model_columns,
         }
+        if self.homogeneity is not None:
+            summary["homogeneity"] = self.homogeneity.summary()
         if self.feasibility is not None:
             blocking = [{"condition": name, "margin": margin} for name, margin in self.feasibility.blocking]
             summary["feasibility"] = {"feasible": self.feasibility.feasible, "margin": self.feasibility.margin, "blocking": blocking}

@@ -109,7 +109,7 @@ class Prediction:
     part : str
         Label of the part.
     columns : str
-        all or essential.
+        all, essential or feasible.
     count : int
         Number of columns.
     fitted : bool
@@ -130,10 +130,18 @@ class Prediction:
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Predictions for every part and every set of columns; joints are their labels."""
+    """Predictions for every part and every set of columns; joints are their labels; `missing`: sets that could not be fitted, each with its reason."""
 
     joints: tuple[str, ...]
     predictions: tuple[Prediction, ...]
+    missing: tuple[str, ...] = ()
+
+    def errors(self) -> dict[str, float]:
+        """Largest relative error on unseen data, %, by set of columns."""
+        unseen = [p for p in self.predictions if not p.fitted]
+        return {
+            columns: max(p.relative_error for p in unseen if p.columns == columns) for columns in dict.fromkeys(p.columns for p in unseen)
+        }
 
     def __str__(self) -> str:
         return self.to_table()
@@ -144,7 +152,7 @@ class CrossValidation:
         for p in self.predictions:
             errors = [f"{value:.3f}" for value in (p.relative_error, *p.per_joint)]
             lines.append((p.part, f"{p.columns} ({p.count})", "fitted" if p.fitted else "predicted", *errors))
-        return aligned(lines)
+        return "\n".join([aligned(lines), *self.missing])
 
     def to_json(self) -> str:
         """JSON text of the predictions."""
@@ -152,7 +160,7 @@ class CrossValidation:
 
     def summary(self) -> dict[str, Any]:
         """What `to_json` writes, as a mapping."""
-        return {"schema": 1, "joints": self.joints, "predictions": self.predictions}
+        return {"schema": 1, "joints": self.joints, "predictions": self.predictions, **({"missing": self.missing} if self.missing else {})}
 
 
 def prediction_errors(observation: Observation, fit: Estimate) -> tuple[float, tuple[float, ...]]:
@@ -187,17 +195,39 @@ def cross_validation(
     model : GeneratedModel, optional
         For methods that need it.
     """
-    settings = point_estimate(settings or EstimateSettings())
-    choices = {"all": settings.columns} | ({} if essential is None else {"essential": tuple(essential)})
+    settings = settings or EstimateSettings()
+    choices = {"all": settings} | ({} if essential is None else {"essential": replace(settings, columns=tuple(essential))})
+    return sets_validation(fit, predict, choices, name=name, model=model)
+
+
+def sets_validation(
+    fit: Observation,
+    predict: Mapping[str, Observation],
+    choices: Mapping[Any, EstimateSettings],
+    *,
+    name: str = "fit",
+    model: GeneratedModel | None = None,
+    fitted: Mapping[Any, Estimate] | None = None,
+) -> CrossValidation:
+    """Fit every set of `choices` on one observation, predict others; a set whose fit fails is left out and told.
+
+    fitted : estimates of `fit` that exist already, by set.
+    """
     predictions = []
+    missing: list[str] = []
     labels: tuple[str, ...] = ()
-    for columns, names in choices.items():
-        estimate = estimate_of(fit, replace(settings, columns=names), model=model)
+    for columns, settings in choices.items():
+        try:
+            known = (fitted or {}).get(columns)
+            estimate = known if known is not None else estimate_of(fit, point_estimate(settings), model=model)
+        except InputError as e:
+            missing.append(f"validation of {columns} parameters, fitted on {name}: {e}")
+            continue
         labels = tuple(joint.joint for joint in estimate.per_joint)
         for part, observation in {name: fit, **predict}.items():
             total, errors = prediction_errors(observation, estimate)
             predictions.append(Prediction(part, columns, len(estimate.names), observation is fit, total, errors))
-    return CrossValidation(labels, tuple(predictions))
+    return CrossValidation(labels, tuple(predictions), tuple(missing))
 
 
 def split_validation(
@@ -209,13 +239,22 @@ def split_validation(
     model: GeneratedModel | None = None,
 ) -> CrossValidation:
     """Cross-validation between windows in s of one record: the first is fitted, the others are predicted."""
+    settings = settings or EstimateSettings()
+    choices = {"all": settings} | ({} if essential is None else {"essential": replace(settings, columns=tuple(essential))})
+    return split_sets(observation, windows, choices, model=model)
+
+
+def split_sets(
+    observation: Observation, windows: Sequence[Window], choices: Mapping[Any, EstimateSettings], *, model: GeneratedModel | None = None
+) -> CrossValidation:
+    """`sets_validation` between windows in s of one record: the first is fitted, the others are predicted."""
     if len(windows) < 2:
         raise InputError(f"{len(windows)} window; expected at least two, the first to fit, the others to predict (validate.split)")
     labels = [f"[{'' if t0 is None else f'{t0:g}'}, {'' if t1 is None else f'{t1:g}'}] s" for t0, t1 in windows]
     parts = {label: observation.between(t0, t1) for label, (t0, t1) in zip(labels, windows, strict=True)}
     first = labels[0]
     others = {label: part for label, part in parts.items() if label != first}
-    return cross_validation(parts[first], others, settings, essential=essential, name=first, model=model)
+    return sets_validation(parts[first], others, choices, name=first, model=model)
 
 
 @dataclass(frozen=True)

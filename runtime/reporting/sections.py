@@ -31,7 +31,8 @@ def identification_sections(result: Identification) -> list[Section]:
         parameter_section(result),
         torque_section(result),
         joint_section(result),
-        *([record_section(result)] if result.record_errors or result.time_stamps else []),
+        *([record_section(result)] if result.record_errors or result.time_stamps or result.homogeneity else []),
+        *([motion_section(result)] if result.motion_table().rows else []),
         residual_section(result, unit),
         correlation_section(result),
         uncertainty_section(result.uncertainty),
@@ -44,7 +45,7 @@ def identification_sections(result: Identification) -> list[Section]:
 def torque_section(result: Identification) -> Section:
     """Fig. 4 of the chapter, one figure per joint, which a script lets zoom."""
     unit = result.torque_unit
-    columns = "the essential" if result.model_columns == "essential" else "all"
+    columns = {"essential": "the essential", "feasible": "the physical", "all": "all"}[result.model_columns]
     images = [
         Image(
             f"Joint {joint.joint}: {result.source}, predicted by {columns} parameters, and error below; {joint.relative_error:.2f} % of the {result.source} norm",
@@ -93,7 +94,19 @@ def record_section(result: Identification) -> Section:
         for one in result.record_errors
     ]
     tables = [Table("Relative error by record and joint, %", header, rows)] if rows else []
-    return Section("Records", result.time_stamps, tables=tables)
+    text = list(result.time_stamps)
+    if result.homogeneity is not None:
+        text.append(result.homogeneity.text)
+        tables += [result.homogeneity.table()] if result.homogeneity.disagreements else []
+    return Section("Records", text, tables=tables)
+
+
+def motion_section(result: Identification) -> Section:
+    """Whether the simulated loop follows the record."""
+    text = (
+        "The loop of the study with the parameters found, beside the record. Parameters of a simulation that does not follow the record are those of nothing.",
+    )
+    return Section("Simulated motion", text, tables=[result.motion_table()])
 
 
 def trail_section(result: Identification) -> Section:
@@ -133,7 +146,10 @@ def validation_section(result: Identification) -> Section:
             for p in part.predictions
         ]
         tables.append(Table("Relative error, %", ("part", "parameters", "use", "total", *(f"joint {j}" for j in part.joints)), rows))
-    text = ("Parameters fitted on one part of the data predict the torques of another; the essential names are those of the whole record.",)
+    text = (
+        "Parameters fitted on one part of the data predict the torques of another; the essential names are those of the whole record.",
+        result.ranking,
+    )
     return Section("Cross-validation", text, tables=tables)
 
 

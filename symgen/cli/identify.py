@@ -47,7 +47,7 @@ def identify(
     ] = True,
     json: Annotated[bool, typer.Option("--json", help="Print estimate.json instead of tables.")] = False,
 ) -> None:
-    """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code 1 where the record does not determine them."""
+    """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code 1 where the estimator does not end well."""
     single_thread()
     with reported_errors(), reserved(output) as results:
         import runtime
@@ -76,5 +76,5 @@ def identify(
         if results is not None:
             runtime.report(result, results)
         show(result.to_json() if json else result.to_text(), output, json=json)
-    if not result.determined:
+    if not result.usable:
         raise typer.Exit(NEGATIVE)

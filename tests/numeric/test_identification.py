@@ -64,7 +64,7 @@ def test_records_of_one_name_stay_apart(model):
     assert record_names([first, second, first]) == ("run", "run (2)", "run (3)")
     result = runtime.identify(model, first, STUDY, further=[first, second])
     parts = [p.part for p in result.validation[1].predictions if p.columns == "all"]
-    assert len(result.validation[1].predictions) == 6 and len(set(parts)) == 3
+    assert len(result.validation[1].predictions) == 9 and len(set(parts)) == 3
     both = runtime.identify(model, [first, second], STUDY)
     assert both.name == "run, run (2)" and both.estimate.provenance["records"] == ["run", "run (2)"]
     assert [one.name for one in both.record_errors] == ["run", "run (2)"]
