@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from runtime.estimators.estimate import Estimate
     from runtime.estimators.methods import estimate
     from runtime.excitation.search import excite
+    from runtime.identification.compare import compare
     from runtime.identification.identification import Identification, identify
     from runtime.identification.plausibility.delay import delay
     from runtime.identification.plausibility.plausibility import plausibility
@@ -47,6 +48,7 @@ __all__ = [
     "Study",
     "advise",
     "cestac",
+    "compare",
     "delay",
     "essential",
     "estimate",
@@ -68,6 +70,7 @@ _MODULES = {
     "runtime.estimators.estimate": ("Estimate",),
     "runtime.estimators.methods": ("estimate",),
     "runtime.excitation.search": ("excite",),
+    "runtime.identification.compare": ("compare",),
     "runtime.identification.identification": ("Identification", "identify"),
     "runtime.identification.plausibility.delay": ("delay",),
     "runtime.identification.plausibility.plausibility": ("plausibility",),

@@ -42,9 +42,12 @@ TOTAL = (10.0, 20.0)
 JOINT = (25.0, 50.0)
 """Of the worst joint, %."""
 PREDICTION = ((1.5, 2.0), (3.0, 5.0))
-"""Error on data that did not give the parameters: times the error of the fit, or % where that is larger; good, then usable."""
+"""Error on data that did not give the parameters: times the error of the fit, or % where that is larger; good, then usable; at most ..."""
+UNSEEN = (10.0, 15.0)
+"""... so many %."""
 DEVIATION = 30.0
 """Deviation of a parameter in % of its value."""
+NAMED = 8  # parameters, in a sentence
 LOST = 25.0
 """Relative error of a joint in %, above which it is asked whether the removed parameters explained it."""
 
@@ -242,7 +245,7 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
 
 def predicted(fit: Estimate, error: float) -> Check:
     """Largest relative error, %, on data that did not give the parameters; open where it is nan."""
-    limits = [max(times * fit.relative_error, least) for times, least in PREDICTION]
+    limits = [min(max(times * fit.relative_error, least), most) for (times, least), most in zip(PREDICTION, UNSEEN, strict=True)]
     return Check(
         "Does it predict data it has not seen?",
         _state(error, *limits) if np.isfinite(error) else "open",
@@ -276,10 +279,11 @@ def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Check:
         percent = 100 * np.where(np.isfinite(deviations), deviations, fit.sigma) / np.abs(fit.X)
     order = np.argsort(-percent)
     above = [fit.names[i] for i in order if percent[i] > DEVIATION]
-    state: State = "good" if not above else "no" if 2 * len(above) > len(fit.names) else "doubtful"
+    physical_set = "standard" in fit.details  # all columns, held together by the conditions and the values of the robot file
+    state: State = "good" if not above else "no" if 2 * len(above) > len(fit.names) and not physical_set else "doubtful"
     text = f"Largest deviation {percent[order[0]]:.0f} % ({fit.names[order[0]]}), median {np.median(percent):.1f} %"
     if above:
-        text += f"; above {DEVIATION:g} %: {', '.join(above)}"
+        text += f"; above {DEVIATION:g} %: {', '.join(above[:NAMED])}" + (f" and {len(above) - NAMED} more" if len(above) > NAMED else "")
     remedy = "do not use these values one by one: the torques know their combination better; a longer record, or one that excites them"
     return Check("Is every value certain?", state, text, f"{DEVIATION:g} % of the value", remedy)
 

@@ -98,7 +98,7 @@ def identification_files(
         "torques.svg": plots.svg(torques),
         "residuals.png": plots.png(residuals),
     }
-    files |= {"standard_parameters.csv": standard_csv(result.estimate)} if result.feasible else {}
+    files |= {"standard_parameters.csv": standard_csv(result.model_estimate)} if result.feasible else {}
     files |= {"friction.png": plots.png(friction_figure(result.friction, unit))} if result.friction else {}
     files |= {} if result.advice is None else advice_files(result.advice)
     return files | ({} if result.resolution is None else resolution_files(result.resolution))

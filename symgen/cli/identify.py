@@ -14,6 +14,7 @@ from symgen.cli.session import (
     RECORDS,
     ROBOT,
     model_of,
+    progress_lines,
     reported_errors,
     say,
     show,
@@ -49,7 +50,7 @@ def identify(
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code 1 where the estimator does not end well."""
     single_thread()
-    with reported_errors(), reserved(output) as results:
+    with reported_errors(), progress_lines(), reserved(output) as results:
         import runtime
         from runtime.model.compile_cache import processor
         from runtime.model.compiled import target_of

@@ -225,6 +225,31 @@ def stopped(checkpoint: Checkpoint | None) -> NoReturn:
 
 
 @contextmanager
+def progress_lines(after: float = 2.0) -> Iterator[None]:
+    """What long work is at, one line each on the error stream, from `after` seconds on."""
+    import logging
+    from time import monotonic
+
+    from runtime.progress import LOGGER
+
+    start = monotonic()
+
+    class Lines(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            if monotonic() - start > after:
+                say(record.getMessage())
+
+    handler, level = Lines(), LOGGER.level
+    LOGGER.addHandler(handler)
+    LOGGER.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        LOGGER.removeHandler(handler)
+        LOGGER.setLevel(level)
+
+
+@contextmanager
 def progress_bar(what: str) -> Iterator[Any]:
     """A bar of `what` on the error stream; the context gives what long work calls with the number done and their total."""
     from rich.console import Console
