@@ -48,6 +48,8 @@ UNSEEN = (10.0, 15.0)
 DEVIATION = 30.0
 """Deviation of a parameter in % of its value."""
 NAMED = 8  # parameters, in a sentence
+RELEVANT = 10.0
+"""Difference between records, % of the value, up to which a parameter is the same in practice, however certain the difference."""
 LOST = 25.0
 """Relative error of a joint in %, above which it is asked whether the removed parameters explained it."""
 
@@ -261,6 +263,9 @@ def agreeing(homogeneity: Homogeneity) -> Check:
     if len(homogeneity.records) < 2:
         return Check(question, "open", homogeneity.text.rstrip("."), limit)
     remedy = "look at the record that differs: load, temperature, time since the last one; or its motion shows what the model leaves out"
+    if not homogeneity.agree and homogeneity.largest <= RELEVANT:
+        text = f"They differ by more than their stated deviations, but by at most {homogeneity.largest:.0f} % of a value"
+        return Check(question, "good", text, f"{limit}, or by at most {RELEVANT:g} % of any value", remedy)
     return Check(question, "good" if homogeneity.agree else "doubtful", homogeneity.text.rstrip("."), limit, remedy)
 
 

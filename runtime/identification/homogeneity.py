@@ -92,6 +92,12 @@ class Homogeneity:
         return not self.p < LEVEL
 
     @property
+    def largest(self) -> float:
+        """Largest difference among the disagreements, % of the larger value; inf where the test in all alone rejects."""
+        differences = [100 * abs(d.value - d.others) / max(abs(d.value), abs(d.others)) for d in self.disagreements]
+        return max(differences, default=0.0 if self.agree else float("inf"))
+
+    @property
     def text(self) -> str:
         """One or two sentences."""
         left_out = "".join(f" Not compared: {reason}." for reason in self.untested)
