@@ -31,7 +31,7 @@ from runtime.motion.reference import Reference, reference_of
 from runtime.observation.filters import States, decimated, filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states
 from runtime.observation.rows import Selection, select_rows
-from runtime.observation.states import observed_states
+from runtime.observation.states import certain_rows, observed_states
 from runtime.observation.system import LoopRows, Observation, stack
 from runtime.records.record import Record
 from runtime.settings.controller import Controller
@@ -106,10 +106,14 @@ class ClosedLoop:
 
     def measured(self) -> Observation:
         """Y = W X + rho of the measured positions on the rows of the loop, which it carries along."""
-        observation = self._observed(
-            [observed_states(self.model, p.record.q, p.record.rate, p.selection.signals, name=p.record.name) for p in self.parts]
-        )
-        return replace(observation, closed_loop=LoopRows(self, np.arange(len(observation.Y))))
+        states = [observed_states(self.model, p.record.q, p.record.rate, p.selection.signals, name=p.record.name) for p in self.parts]
+        observation = self._observed([replace(s, errors=None) for s in states])
+        observation = replace(observation, closed_loop=LoopRows(self, np.arange(len(observation.Y))))
+        if all(s.errors is None for s in states):
+            return observation
+        certain = [certain_rows(self.model, s[p.selection.samples][p.selection.kept]) for s, p in zip(states, self.parts, strict=True)]
+        used = [c[j, p.selection.mask[j]] for j in range(observation.n) for c, p in zip(certain, self.parts, strict=True)]
+        return observation.where(np.concatenate(used))
 
     def instruments(self, runs: Sequence[SimulatedRun], observation: Observation) -> Observation:
         """The rows and columns of `observation` with Z of the simulated positions, through the filters of the record, in place of W."""

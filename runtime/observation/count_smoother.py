@@ -16,14 +16,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.special import erfcx
 
 from runtime.observation.spline_posterior import Basis, Factor
 
 Array = np.ndarray
 
-KNOTS = 1e-3
-"""Distance of knots, s."""
+KNOTS = 2e-3
+"""Distance of knots, s, or of samples where that is larger."""
 PASSES, FIRST = 12, 6
 """Most passes over the sites, and passes over the changes alone ahead of them."""
 DAMPING = 0.5
@@ -31,6 +32,12 @@ CHANGE = 0.02
 """Relative change of the precisions at which passes end."""
 LINES = 0.01
 """Error of a line that is always allowed for, steps."""
+WINDOW, OF_RECORD = 0.5, 10.0
+"""Length of time that has a jerk density of its own, s, and the weight of the whole record in it, in determined jerks."""
+RANGE, CONDITION = 1e-3, 1e-9
+"""Least share of a window's density in that of the record; least density that a Cholesky factor resolves, by h^5."""
+SPACING = 0.3
+"""Distance of bounds inside an interval, in units of the time r^(-1/5) in which white jerk of density r crosses it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,21 +66,20 @@ class Smoothed:
         return np.asarray(self.basis.at_samples(self.c + self.factor.draw(rng))[:, : self.basis.N] + self.origin)
 
 
-def smoothed(counts: Array, Ts: float, *, lines: Array | float = LINES, offsets: Array | None = None) -> Smoothed:
+def smoothed(counts: Array, Ts: float, *, lines: Array | float = LINES) -> Smoothed:
     """Posterior of counts, shape (n, N); nan: a sample that is missing.
 
-    lines : error of lines, steps.   offsets : shape (n, N), middle of the interval of each sample less its count, of uneven lines.
+    lines : error of lines, steps.
     """
     n, N = counts.shape
     basis = Basis(N, n, max(1, round(KNOTS / Ts)), Ts)
-    missing = ~np.isfinite(counts)
+    known = np.zeros((n, basis.padded), dtype=bool)
+    known[:, :N] = np.isfinite(counts)
     origin = np.asarray(np.round(np.nanmean(counts, axis=1)))[:, None]
-    y = np.zeros((n, basis.padded))
-    y[:, :N] = np.where(missing, 0.0, counts - origin)
-    idle = np.ones(y.shape, dtype=bool)
-    idle[:, :N] = missing
-    tau, nu = _from_changes(y, idle, N)
-    density = np.full((n, basis.M), _first_density(y[:, :N], Ts))
+    y = np.zeros(known.shape)
+    y[:, :N] = np.where(known[:, :N], counts - origin, 0.0)
+    tau, nu = _from_changes(y, known)
+    density = np.full((n, basis.M), _first_density(y[:, :N]))
     c = np.zeros((n, basis.P))
     e2 = np.square(lines)
     for number in range(-FIRST, PASSES):
@@ -84,20 +90,40 @@ def smoothed(counts: Array, Ts: float, *, lines: Array | float = LINES, offsets:
         density = _density(basis, c, Z, density)
         if number < 0:
             continue
-        x, v = basis.at_samples(c), basis.variances(Z)
-        cavity = 1 / np.maximum(1 / v - tau, 0.02 / v)
-        middle = cavity * (x / v - nu)
+        if number == 0:
+            sites = _sites(y, known, density, Ts)
+            tau, nu = np.where(sites, tau, 0.0), np.where(sites, nu, 0.0)
+            middle = y[sites]
+        x, v, t, u = basis.at_samples(c)[sites], basis.variances(Z)[sites], tau[sites], nu[sites]
+        cavity = 1 / np.maximum(1 / v - t, 0.02 / v)
+        m = cavity * (x / v - u)
         s = np.sqrt(cavity + e2)
-        g, H = box_moments((y - 0.5 - middle) / s, (y + 0.5 - middle) / s)
+        g, H = box_moments((middle - 0.5 - m) / s, (middle + 0.5 - m) / s)
         g, H = g / s, H / s**2
         left = 1 - cavity * H
-        tau_new, nu_new = H / left, (g + H * middle) / left
-        tau_new[idle] = nu_new[idle] = 0
-        change = np.abs(tau_new - tau).sum() / tau.sum()
-        tau, nu = tau + DAMPING * (tau_new - tau), nu + DAMPING * (nu_new - nu)
+        t_new, u_new = H / left, (g + H * m) / left
+        change = np.abs(t_new - t).sum() / t.sum()
+        tau[sites], nu[sites] = t + DAMPING * (t_new - t), u + DAMPING * (u_new - u)
         if change < CHANGE:
             break
     return Smoothed(basis, c, Z, factor, density, origin)
+
+
+def _sites(y: Array, known: Array, density: Array, Ts: float) -> Array:
+    """Samples whose bounds count: both sides of every change, and in between as often as the motion forgets, bool of the shape of y.
+
+    Bounds of samples close together are one bound. Taken as many, each would see the others as independent knowledge.
+    """
+    sites = np.zeros(y.shape, dtype=bool)
+    for j in range(len(y)):
+        at = np.flatnonzero(known[j])
+        change = np.flatnonzero(np.diff(y[j, at]))
+        sites[j, at[[0, -1]]] = sites[j, at[change]] = sites[j, at[change + 1]] = True
+        ends = np.concatenate([[0], np.repeat(change, 2) + np.tile([0, 1], len(change)), [len(at) - 1]]).reshape(-1, 2)
+        spacing = SPACING * density[j].mean() ** -0.2 / Ts
+        for a, b in ends[ends[:, 1] - ends[:, 0] > spacing]:
+            sites[j, at[np.linspace(a, b, int((b - a) / spacing) + 1).astype(int)]] = True
+    return sites
 
 
 def box_moments(a: Array, b: Array) -> tuple[Array, Array]:
@@ -112,31 +138,35 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array]:
     return np.where(flip, -g, g), np.clip(g * g + high * at_high - low * at_low, 0, 1 - 1e-9)
 
 
-def _first_density(y: Array, Ts: float) -> Array:
+def _first_density(y: Array) -> Array:
     """A density above any that the record asks for, shape (n, 1): the range of the motion passed in a hundredth of a second."""
     return np.asarray((np.ptp(y, axis=1, keepdims=True) + 1) ** 2 * 1e10)
 
 
-def _from_changes(y: Array, idle: Array, N: int) -> tuple[Array, Array]:
+def _from_changes(y: Array, known: Array) -> tuple[Array, Array]:
     """First sites: at the two samples around a change of the count; a hundredth of an interval at every other sample."""
-    tau = np.where(idle, 0.0, 0.06)
+    tau = np.where(known, 0.06, 0.0)
     nu = tau * y
     for j in range(len(y)):
-        known = np.flatnonzero(~idle[j, :N])
-        e = np.flatnonzero(np.diff(y[j, known]))
+        at = np.flatnonzero(known[j])
+        e = np.flatnonzero(np.diff(y[j, at]))
         if len(e) < 2:
             continue
-        before, after = known[e], known[e + 1]
-        at, line = (before + after) / 2, (y[j, before] + y[j, after]) / 2
-        speed = (np.interp(at + 25, at, line) - np.interp(at - 25, at, line)) / 50  # steps a sample
+        before, after = at[e], at[e + 1]
+        t, line = (before + after) / 2, (y[j, before] + y[j, after]) / 2
+        speed = (np.interp(t + 25, t, line) - np.interp(t - 25, t, line)) / 50  # steps a sample
         weight = 6 / np.clip(np.abs(speed) * (after - before), 0.02, 1) ** 2
         for samples in (before, after):
             np.add.at(tau[j], samples, weight)
-            np.add.at(nu[j], samples, weight * (line + (samples - at) * speed))
+            np.add.at(nu[j], samples, weight * (line + (samples - t) * speed))
     return tau, nu
 
 
 def _density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
-    """MacKay's rule, shape (n, M)."""
+    """MacKay's rule in windows of time, the whole record counting as OF_RECORD determined jerks; shape (n, M)."""
     squares, determined = basis.jerk(c) ** 2 * basis.h, np.maximum(1 - basis.jerk_variances(Z) * basis.h / density, 1e-9)
-    return np.broadcast_to(squares.mean(axis=1, keepdims=True) / determined.mean(axis=1, keepdims=True), density.shape)
+    whole = squares.mean(axis=1, keepdims=True) / determined.mean(axis=1, keepdims=True)
+    size = max(1, round(WINDOW / basis.h))
+    squares, determined = (size * uniform_filter1d(x, size, axis=1, mode="nearest") for x in (squares, determined))
+    least = np.maximum(RANGE * whole, CONDITION / (basis.h**5 * basis.m))
+    return np.asarray(np.maximum((squares + OF_RECORD * whole) / (determined + OF_RECORD), least))

@@ -33,7 +33,7 @@ class SpeedErrors:
     deviation: Array
     root: Array
 
-    def __getitem__(self, samples: slice) -> SpeedErrors:
+    def __getitem__(self, samples: slice | Array) -> SpeedErrors:
         return SpeedErrors(self.deviation[samples], self.root)
 
     def along(self, G: Array) -> Array:
@@ -53,7 +53,7 @@ class States:
     qdd: Array
     errors: SpeedErrors | None = None
 
-    def __getitem__(self, samples: slice) -> States:
+    def __getitem__(self, samples: slice | Array) -> States:
         return States(self.q[samples], self.qd[samples], self.qdd[samples], None if self.errors is None else self.errors[samples])
 
     def __len__(self) -> int:

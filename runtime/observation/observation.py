@@ -29,7 +29,7 @@ from runtime.observation.filters import States, decimated, filtered_states, medi
 from runtime.observation.regressor_signals import decimated_columns, distinct_entries
 from runtime.observation.rows import Selection, select_rows
 from runtime.observation.segments import HeldRows, Segment, SegmentFactors, Window
-from runtime.observation.states import observed_states
+from runtime.observation.states import certain_rows, observed_states
 from runtime.observation.system import (
     HELD,
     Observation,
@@ -142,6 +142,7 @@ def observation_from_states(
 ) -> Observation:
     """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated before.
 
+    Where errors of the velocities are known, rows in which the direction of dry friction is uncertain are left out as well ("direction").
     columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
     """
     check_states(model, states.q, states.qd, states.qdd)
@@ -150,17 +151,22 @@ def observation_from_states(
         raise InputError(f"torque {torque.shape}, model {model.NAME} with {len(model.JOINTS)} joints; expected {(n, K)} and {n} joints")
     names = tuple(model.BASE_PARAMETERS) if columns is None else tuple(columns)
     numbers = column_numbers(names, model.BASE_PARAMETERS)
-    store = decimated_columns(model, states[selection.samples], selection.factor, selection.signals.decimate, constants or {}, numbers)
-    mask = selection.mask.ravel()
+    window = states[selection.samples]
+    store = decimated_columns(model, window, selection.factor, selection.signals.decimate, constants or {}, numbers)
+    rows, dropped = selection.mask, dict(selection.dropped)
+    if states.errors is not None:
+        rows = rows & certain_rows(model, window[selection.kept], constants)
+        dropped["direction"] = tuple(int(k) for k in (selection.mask.sum(axis=1) - rows.sum(axis=1)))
+    mask = rows.ravel()
     return Observation(
         W=np.compress(mask, store.reshape(len(names), n * K), axis=1).T,
         Y=torque.ravel()[mask],
-        rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
+        rows=tuple(int(k) for k in rows.sum(axis=1)),
         names=names,
         t=np.tile(selection.t, n)[mask],
         record=np.zeros(int(mask.sum()), dtype=int),
         rate=selection.rate,
-        dropped=selection.dropped,
+        dropped=dropped,
         settings=_settings(selection.signals, selection.rows, selection.factor),
         files=dict(files or {}),
     )

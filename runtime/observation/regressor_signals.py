@@ -2,7 +2,6 @@
 
 Most entries of W are structurally zero or repeat each other up to the sign, and decimation is linear: filter
 the signals, then place them. The regressor is evaluated in blocks on one reused store and decimated block by block: the signals are not stored.
-Where errors of the velocities are known, columns that switch with a direction of motion are their expectations, erf(s/(sqrt(2) sigma)) for sign(s).
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import numpy as np
 from runtime.model.generated import GeneratedModel
 from runtime.observation.decimation import Decimation, Plan
 from runtime.observation.filters import States, decimation_plan
-from runtime.observation.sign_errors import Switch, expected_shift, switches
 from runtime.settings.study import Decimate
 
 Array = np.ndarray
@@ -66,8 +64,6 @@ class DistinctSignals:
         self.model, self.constants = model, constants
         self.rows = (entries.k * len(model.JOINTS) + entries.j)[entries.source]
         self._room: dict[int, tuple[Array, Array]] = {}  # by number of samples: store, signals
-        self._entries = entries
-        self._switches: list[tuple[int, float, Switch]] | None = None
 
     def __call__(self, states: States) -> Array:
         """Signals of the states (B, n), shape (S, B)."""
@@ -76,19 +72,7 @@ class DistinctSignals:
             self._room[B] = self.model.store(B), np.empty((len(self.rows), B))
         out, signals = self._room[B]
         D = self.model.regressor(states.q, states.qd, states.qdd, out=out, **self.constants)
-        np.take(D.transpose(2, 1, 0).reshape(-1, B), self.rows, axis=0, out=signals, mode="clip")
-        if states.errors is not None:
-            for row, G_j, switch in self._switching():
-                signals[row] += G_j * expected_shift(switch, states.qd @ switch.G, states.errors.along(switch.G))
-        return signals
-
-    def _switching(self) -> list[tuple[int, float, Switch]]:
-        """Signals that switch: their row, G_j of the joint they act on, the switch."""
-        if self._switches is None:
-            known = {s.column: s for s in switches(self.model, self.model.BASE_PARAMETERS, self.constants, passive="left out")}
-            sources = enumerate(zip(self._entries.k[self._entries.source], self._entries.j[self._entries.source], strict=True))
-            self._switches = [(row, float(known[k].G[j]), known[k]) for row, (k, j) in sources if k in known]
-        return self._switches
+        return np.take(D.transpose(2, 1, 0).reshape(-1, B), self.rows, axis=0, out=signals, mode="clip")
 
 
 class DecimatedSignals:

@@ -117,18 +117,6 @@ def switches(
     return tuple(switching)
 
 
-def expected_shift(switch: Switch, s: Array, sigma: Array) -> Array:
-    """E f - f of a switch, shape (N,), at s = G qd known up to normal errors of deviation sigma, shape (N,)."""
-    shift = np.zeros(len(s))
-    near = np.flatnonzero((np.abs(s) < FAR * sigma) | ((sigma > 0) & (switch.kink != 0)))
-    u = s[near] / sigma[near]
-    m = erf(u / np.sqrt(2))
-    shift[near] = switch.jump * (m - np.sign(u))
-    if switch.kink:
-        shift[near] += switch.kink * sigma[near] * (u * (m - np.sign(u)) + np.sqrt(2 / np.pi) * np.exp(-(u**2) / 2))
-    return shift
-
-
 def _shape(kind: str, direction: str) -> tuple[float, float, float] | None:
     """linear, jump, kink of an element of friction; None for one that does not switch."""
     both = direction == "both"

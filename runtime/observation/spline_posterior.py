@@ -95,11 +95,14 @@ class Factor:
 
     @classmethod
     def of(cls, A: Array) -> Factor:
-        """Factor of A, shape (4, n, P)."""
-        L, info = dpbtrf(A.reshape(4, -1), lower=1)
-        if info:
-            raise np.linalg.LinAlgError(f"the precision of coefficient {info} is not positive")
-        return cls(L, A.shape[1])
+        """Factor of A, shape (4, n, P); where rounding made it indefinite, of A with a diagonal larger by the least share that helps."""
+        n = A.shape[1]
+        A = A.reshape(4, -1)
+        for share in (0.0, 1e-13, 1e-11, 1e-9):
+            L, info = dpbtrf(np.vstack([A[:1] * (1 + share), A[1:]]), lower=1)
+            if not info:
+                return cls(L, n)
+        raise np.linalg.LinAlgError(f"the precision of coefficient {info} is not positive")
 
     def solve(self, g: Array) -> Array:
         """A^-1 g, shape (n, P)."""

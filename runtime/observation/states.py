@@ -2,11 +2,12 @@
 
 lowpass    positions as they are, filtered and differentiated (`runtime.observation.filters`)
 counts     positions as counts of encoders (`runtime.observation.counts`), whose posterior mean is then filtered alike; errors of the
-           velocities are known, and make the columns of dry friction expectations
+           velocities are known: rows with dry friction of uncertain direction are left out (`certain_rows`)
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,9 +17,13 @@ from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, drives_of
 from runtime.observation.counts import Reading, read_counts
 from runtime.observation.filters import SpeedErrors, States, filtered_states
+from runtime.observation.sign_errors import switches
 from runtime.settings.study import Signals
 
 Array = np.ndarray
+
+UNCERTAIN = 1.0
+"""Deviations of a speed below which its sign is not used; chosen on simulated records (docs/theory/counts.md)."""
 
 
 def observed_states(
@@ -52,6 +57,18 @@ def joint_states(reading: Reading, rate: float, signals: Signals, drives: Drives
     q = reading.q if drives is None else drives.joint_position(reading.q)
     states = filtered_states(q, rate, replace(signals, median=1))
     return replace(states, errors=SpeedErrors(reading.s_qd, encoder_root(drives, q.shape[1])))
+
+
+def certain_rows(model: GeneratedModel, states: States, constants: Mapping[str, float] | None = None) -> Array:
+    """Rows of every joint in which each direction of dry friction is known, bool, shape (n, K), of states (K, n) with known errors.
+
+    A row of joint j is uncertain where |s| is below UNCERTAIN deviations of s, s = G qd the speed of a column that switches and acts on j.
+    """
+    certain = np.ones(states.q.T.shape, dtype=bool)
+    if states.errors is not None:
+        for switch in switches(model, model.BASE_PARAMETERS, constants, passive="left out"):
+            certain[list(switch.joints)] &= np.abs(states.qd @ switch.G) >= UNCERTAIN * states.errors.along(switch.G)
+    return certain
 
 
 def encoder_drives(model: GeneratedModel, signals: Signals, drives: Drives | None = None) -> Drives | None:
