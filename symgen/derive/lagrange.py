@@ -40,6 +40,8 @@ from symgen.errors import DescriptionError
 Array = np.ndarray[Any, Any]
 NEWTON_STEPS, NEWTON_STEP, CLOSED = 50, 0.5, 1e-11  # iterations, rad or m per iteration, defect of a closed loop
 SETTLED = 1e-15  # rad or m: further iterations change nothing
+ON_THE_WAY, FOLLOWED = 1e-6, 8  # the same on the way from `start`, and places on that way
+REGULAR = 0.05  # of the smallest singular value of the closure at `start`, over its largest: less is near a dead point
 DRAWS = 20  # attempts to find states in which the loops close
 SX = Any  # casadi.SX
 
@@ -135,6 +137,8 @@ class Lagrange:
         self._loop_jacobian = ca.Function("loop_jacobian", [q], [ca.densify(ca.jacobian(phi, q))])
         self._loop_rate = ca.Function("loop_rate", [q, qd], [ca.densify(ca.jtimes(ca.jtimes(phi, q, qd), q, qd))])
         self._start = _start(robot, q, self.constants)
+        start = {j: x for loop in robot.loops for j, x in loop.start.items()}
+        self._home = np.array([start[j] for j in robot.moving]) if set(robot.moving) <= set(start) else None
 
     def poses(self, q: Array) -> Array:
         """0Tj of every frame in file order, (..., frames, 4, 4)."""
@@ -218,7 +222,8 @@ class Lagrange:
     def motion(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
         """Tree motion q, qd, qdd (..., n) and G = dq/dqa (..., n, n_a) of the actuated q, qd, qdd (..., n_a).
 
-        Loops are closed by Newton's method from the constraints, or from `start`; a state that it cannot close is NaN.
+        Loops are closed by Newton's method from the constraints, or followed from a `start` of all joints; a state that it cannot close, or reach
+        without passing near a dead point, is NaN.
         """
         actuated = [self.robot.moving.index(j) for j in self.robot.joints]
         passive = [self.robot.moving.index(j) for j in self.robot.passive]
@@ -227,19 +232,30 @@ class Lagrange:
         G[..., actuated, :] = np.eye(len(actuated))
         if not passive:
             return x, np.asarray(qd), np.asarray(qdd), G
-        for _ in range(NEWTON_STEPS):
-            step = np.linalg.pinv(_floats(self._loop_jacobian, x)[..., passive]) @ _floats(self._loop, x)
-            x[..., passive] -= np.clip(step[..., 0], -NEWTON_STEP, NEWTON_STEP)
-            if np.abs(step).max() < SETTLED:
-                break
+        wanted, regular = x[..., actuated].copy(), np.ones(x.shape[:-1], dtype=bool)
+        first = self._home[actuated] if self._home is not None else wanted
+        for share in np.arange(1, FOLLOWED + 1) / FOLLOWED if self._home is not None else (1.0,):
+            x[..., actuated] = first + share * (wanted - first)
+            for _ in range(NEWTON_STEPS):
+                step = np.linalg.pinv(_floats(self._loop_jacobian, x)[..., passive]) @ _floats(self._loop, x)
+                x[..., passive] -= np.clip(step[..., 0], -NEWTON_STEP, NEWTON_STEP)
+                if np.abs(step[regular]).max(initial=0.0) < (SETTLED if share == 1 else ON_THE_WAY):
+                    break
+            if self._home is not None:
+                regular &= self._regularity(x, passive) > REGULAR * self._regularity(self._home, passive)
         J = _floats(self._loop_jacobian, x)
         inverse = np.linalg.pinv(J[..., passive])
         G[..., passive, :] = -inverse @ J[..., actuated]
         xd = (G @ np.asarray(qd)[..., None])[..., 0]
         xdd = (G @ np.asarray(qdd)[..., None])[..., 0]
         xdd[..., passive] -= (inverse @ _floats(self._loop_rate, x, xd))[..., 0]  # Jp qddp + Ja qdda + Jdot qd = 0
-        x[np.abs(_floats(self._loop, x)).max(axis=(-2, -1)) > CLOSED] = np.nan
+        x[(np.abs(_floats(self._loop, x)).max(axis=(-2, -1)) > CLOSED) | ~regular] = np.nan
         return x, xd, xdd, G
+
+    def _regularity(self, x: Array, passive: list[int]) -> Array:
+        """Smallest over largest singular value of the closure's derivatives by the passive joints."""
+        s = np.linalg.svd(_floats(self._loop_jacobian, x)[..., passive], compute_uv=False)
+        return np.asarray(s[..., -1] / s[..., 0])
 
     def actuated_regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
         """G' D_tree at actuated q, qd, qdd (..., n_a), order `robot.joints`: (..., n_a, p)."""

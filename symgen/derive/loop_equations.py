@@ -87,9 +87,13 @@ class LoopSystem:
 
     def linearised(self, q: Mapping[int, float]) -> tuple[Array, Array]:
         """Residuals (m,) and their derivatives by the tied joints (m, m), in floats."""
-        algebra = FloatAlgebra(self.robot, {j: np.asarray(x) for j, x in q.items()})
-        J = np.array([[float(x) for x in row] for row in self.jacobian(algebra)])
-        return np.array([float(x) for x in self.residual(algebra)]), J[:, len(self.robot.joints) :]
+        algebra, joints = FloatAlgebra(self.robot, {j: np.asarray(x) for j, x in q.items()}), self.closure.independent
+        rows = residuals(
+            self.robot, JetAlgebra(algebra, dict(zip(joints, np.eye(len(joints)), strict=True))), self.closure
+        )  # all columns at once
+        used = [jet(rows[k]) for k in self.equations]
+        J = np.array([np.broadcast_to(row.xd, len(joints)) for row in used], dtype=float)
+        return np.array([float(row.x) for row in used]), J[:, len(self.robot.joints) :]
 
     def mode(self) -> float:
         """Sign of det J_u at the start: it stays as long as the mechanism passes no dead point, hence in one assembly mode."""
@@ -100,13 +104,15 @@ class LoopSystem:
         (j, *more), tied = self.robot.joints, self.closure.tied
         if more or self.robot.frame(j).sigma != REVOLUTE:
             return None
-        q = {i: self.closure.start[i] for i in self.closure.independent}
+        q, mode = {i: self.closure.start[i] for i in self.closure.independent}, self.mode()
         for _ in range(TURN_STEPS):
             q[j] += 2 * np.pi / TURN_STEPS
             for _ in range(5):
                 r, J = self.linearised(q)
                 q |= {u: q[u] - dx for u, dx in zip(tied, np.linalg.solve(J + 1e-14 * np.eye(len(tied)), r), strict=True)}
-            if np.abs(r).max() > 1e-6 or np.linalg.det(J) * self.mode() <= 0:
+                if np.abs(r).max() < 1e-4:  # the next turn goes on from here
+                    break
+            if np.abs(r).max() > 1e-4 or np.linalg.det(J) * mode <= 0:
                 return None
         gained = {u: q[u] - self.closure.start[u] for u in tied}
         if any(self.robot.frame(u).sigma != REVOLUTE and abs(x) > 1e-6 for u, x in gained.items()):

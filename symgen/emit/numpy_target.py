@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from symgen.derive.loop_equations import loop_system
 from symgen.derive.loops import close
+from symgen.description.robot import PRISMATIC, Robot
 from symgen.emit.header import literal, tables
 from symgen.emit.python_target import arguments, context, element_lines
 from symgen.emit.render import laid_out
@@ -20,6 +21,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     """The NumPy module of `spec`. Same robot file, same version: same bytes."""
     robot = spec.robot
     start = [close(robot).start[j] for j in close(robot).independent] if spec.tied else []
+    units = units_of_joints(robot) if spec.tied else ()
     mode = f"_MODE = {loop_system(robot).mode()}  # sign of det J_u in the assembly mode of _START" if spec.tied else ""
     return laid_out(
         "module.py",
@@ -28,13 +30,22 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "size": BLOCK,
             "turn": loop_system(robot).turn() if spec.tied else None,
             "joint": robot.joints[0],
-            "tables": [*tables(spec), *literal("LINKS", robot.links), *([f"_START = {tuple(start)!r}", mode] if start else [])],
+            "tables": [*tables(spec), *literal("LINKS", robot.links), *([f"_START = {tuple(start)!r}", mode] if start else []), *units],
+            "slides": bool(units),
             "store_constants": list(constant_entries(spec.functions["regressor"], "S")),
             "elements": element_lines(robot, LANGUAGE),
             "evaluated": {name: list(_evaluation(spec, f)) for name, f in spec.functions.items()},
             "blocks": [_block(spec, f) for f in spec.functions.values() if f.sections],
         },
     )
+
+
+def units_of_joints(robot: Robot) -> tuple[str, ...]:
+    """Source of a unit of motion for each independent joint where some slide: 1 rad, and the longest length of the robot file."""
+    kinds = [robot.frame(j).sigma for j in close(robot).independent]
+    longest = max(abs(e.value(robot.constants)) for f in robot.frames for e in (f.b, f.d, f.r0))
+    units = ", ".join(repr(longest) if sigma == PRISMATIC else "1.0" for sigma in kinds)
+    return (f"_UNITS = ({units},)  # rad; of slides the longest length, m",) if PRISMATIC in kinds else ()
 
 
 def _evaluation(spec: ModuleSpec, f: Function) -> Iterator[str]:

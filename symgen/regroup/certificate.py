@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
@@ -32,9 +33,10 @@ from symgen.derive.exact import Array, Draw, Fp
 from symgen.derive.loops import close
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot
+from symgen.regroup.closed_draw import closed_draw
 from symgen.regroup.finite_field import rref
-from symgen.regroup.general import closed_draw
-from symgen.regroup.regrouping import NUMERIC, Regrouping
+from symgen.regroup.numbers import numbered
+from symgen.regroup.regrouping import EXACT, Regrouping
 from symgen.regroup.solve import sample, states_for
 
 if TYPE_CHECKING:
@@ -46,6 +48,7 @@ ZERO_BELOW = 1e-9  # rad, m or a cosine: a denominator that is zero but for roun
 AT_VALUES = "say --at-values for the regrouping that does"
 SURE, MOST_DRAWS = 1e-12, 8  # largest probability that a false identity passes, and draws over F_p at most
 FEW_STATES = 3  # of each draw for the identities: one would do
+SEEN = 1e3  # gap of singular values that rounding does not make
 CLEAR = 1e9  # gap of singular values at the rank of a geometry that is special; less where it is a hair off one
 TOLERANCE = 1e-9  # relative to the largest entry: rounding of some thousand operations and of the closed loops
 
@@ -75,8 +78,8 @@ class Certificate:
     module_errors : mapping
         Largest difference of each function of the emitted module from the independent dynamics, of the largest entry; empty where no
         module was evaluated.
-    general : bool
-        Whether the robot has general loops, whose rank is that of the independent regressor; singular values far above rounding prove it.
+    rank_in_floats : bool
+        Whether `rank` is that of the independent regressor: loops of which F_p gives no points of one geometry.
     error_probability : float
         Bound on the probability that a false identity passes the exact checks; 1 where coefficients are numbers, which are checked in floats.
     """
@@ -92,7 +95,7 @@ class Certificate:
     numeric_gap: float
     torque_error: float
     module_errors: Mapping[str, float] = field(default_factory=dict)
-    general: bool = False
+    rank_in_floats: bool = False
     error_probability: float = 0.0
 
     @property
@@ -130,7 +133,7 @@ class Certificate:
 
     def __str__(self) -> str:
         """A line per check, marked `ok` or FALSE, then the verdict."""
-        where = f"modulo {' and '.join(map(str, self.primes))}" if self.primes and not self.general else "in floats"
+        where = f"modulo {' and '.join(map(str, self.primes))}" if self.primes and not self.rank_in_floats else "in floats"
         doubt = f"; a false one passes with probability below {self.error_probability:.0e}" if self.primes else ", in floats"
         columns = any(text.startswith("column") for text in self.failures)
         lines = [
@@ -175,7 +178,6 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
     robot = regrouping.robot
     witness = independent(robot)
     acting = [c for c, name in enumerate(robot.parameters) if name not in regrouping.no_effect]
-    rank, gap = numeric_rank(witness.W[:, acting])
     base = [robot.parameters.index(own) for own in regrouping.own]
     bound = 2 * degree(regrouping) / 2**30
     draws = 2
@@ -183,12 +185,11 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
         draws += 1
     primes = primes_for(robot, draws, seed)
     exact_ranks, wrong = zip(*(_modulo(regrouping, seed + k, p, sampler) for k, p in enumerate(primes)), strict=True)
-    if close(robot).tied:
-        exact_rank = numeric_rank(witness.W[:, base])[0]
-    else:
-        exact_rank = min(exact_ranks)
+    ranks = [r for r in exact_ranks if r is not None]
+    exact_rank = min(ranks) if len(ranks) == draws else numeric_rank(witness.W[:, base])[0]
+    rank, gap = numeric_rank(witness.W[:, acting], proved=exact_rank)
     failures = [] if exact_rank == len(regrouping) else [f"rank is {exact_rank}, not {len(regrouping)}: the base columns are dependent"]
-    if regrouping.method == NUMERIC:
+    if regrouping.method != EXACT:
         failures += [f"column of {name} is not what the formulas say (in floats)" for name in _false_in_floats(regrouping, witness.W, base)]
         primes = ()
     else:
@@ -219,7 +220,7 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
         numeric_rank=rank,
         numeric_gap=gap,
         torque_error=error,
-        general=bool(close(robot).tied),
+        rank_in_floats=len(ranks) < draws,
         error_probability=bound**draws if primes else 1.0,
     )
 
@@ -265,21 +266,26 @@ def degree(regrouping: Regrouping) -> int:
     return 3 * path + 3 + 2 * max(map(constant, rows), default=0) + coefficients
 
 
-def _modulo(regrouping: Regrouping, seed: int, p: int, sampler: Sampler) -> tuple[int, list[str]]:
-    """Rank of the base columns over F_p (0 for general loops, whose points have a geometry each), and the columns that are not what the formulas say."""
+def _modulo(regrouping: Regrouping, seed: int, p: int, sampler: Sampler) -> tuple[int | None, list[str]]:
+    """Rank of the base columns over F_p (None where no points of one geometry are found), and the columns that are not what the formulas say."""
     robot = regrouping.robot
     names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
+    rank: int | None = None
     if close(robot).tied:
+        robot = numbered(robot)
         try:
-            closed = closed_draw(robot, seed, 3, p=p)
+            closed = closed_draw(robot, seed, FEW_STATES, p=p)
         except ArithmeticError:
-            return 0, list(names) if regrouping.method != NUMERIC else []
+            return None, list(names) if regrouping.method == EXACT else []
         draw: Draw = closed
         W = closed.regressor(names)
+        with suppress(ArithmeticError):
+            fixed = closed_draw(robot, seed, len(own) // len(robot.joints) + 10, p=p, one_geometry=True)
+            rank = len(rref(fixed.regressor(regrouping.own).reshape(-1, len(own)), p, reduced=False)[0])
     else:
         draw = Draw(robot, seed, states_for(robot, names), p=p)
         W = sampler(draw, names)
-    rank = 0 if close(robot).tied else len(rref(W[:, own], p, reduced=False)[0])
+        rank = len(rref(W[:, own], p, reduced=False)[0])
     few = W.reshape(len(robot.joints), -1, len(names))[:, :FEW_STATES]
     predicted = np.zeros_like(few)
     for k, b in enumerate(regrouping.base):
@@ -318,11 +324,16 @@ def base_values(regrouping: Regrouping, chi: Array) -> Array:
     return np.array([sum(c.value(robot.constants) * value[name] for name, c in b.combination.items()) for b in regrouping.base])
 
 
-def numeric_rank(W: Array, *, tolerance: float = 1e-9) -> tuple[int, float]:
-    """Rank of a float matrix by SVD after scaling its columns, and the gap s_rank / s_(rank+1)."""
+def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple[int, float]:
+    """Rank of a float matrix by SVD after scaling its columns, and the gap s_rank / s_(rank+1).
+
+    Where the rank is `proved`, singular values below the tolerance count as far as a gap of SEEN stands behind them.
+    """
     norms = np.linalg.norm(W, axis=0)
     acts = norms > 1e-12 * np.median(norms[norms > 0]) if norms.any() else norms > 0  # below: rounding of a column without effect
     s = np.linalg.svd(W[:, acts] / norms[acts], compute_uv=False)
     rank = int(np.sum(s > tolerance * s[0]))
+    if rank < proved < s.size and s[proved - 1] > SEEN * s[proved]:
+        rank = proved
     gap = float(s[rank - 1] / max(s[rank], np.finfo(float).tiny)) if rank < s.size else float("inf")
     return rank, gap

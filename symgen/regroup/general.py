@@ -1,172 +1,40 @@
-"""Base parameters of robots with general loops, exact: points of the closed mechanism over F_p.
+"""Base parameters of robots with general loops, exact: relations from points of the closed mechanism over F_p (`regroup.closed_draw`).
 
-The tied joints are algebraic functions of the actuated ones, so states cannot be drawn at one geometry over F_p. But where the orientations of
-every loop agree by construction (sums of angles), the closure equations r = 0 are positions: linear in the lengths and in the strokes of slides.
-Angles are therefore drawn at random, all of them, and as many lengths or strokes as there are equations are solved for. Each sample is a robot of its own
-in a state of its own, a random point of
-
-    V = {(lengths, configuration) : r = 0} ,
-
-a bundle of linear spaces over the torus of the angles, hence irreducible: an identity that holds at random points of V holds on all of V, for
-every geometry and in every assembly mode. Rates and accelerations of the tied joints follow from J qd = 0, J qdd + Jd qd = 0, by linear equations.
-
-Relations are found the same way. Which columns depend on which shows in floats, at states closed by Newton near the start; the
-coefficients beta_k = P_k/Q, polynomials in the lengths, are the nullspace over F_p of
+Which columns depend on which shows at points of one geometry, by an echelon form. Coefficients are first looked for among multiples of monomials of
+lengths and sums of two, at two geometries. Others, beta_k = P_k/Q with polynomials in the lengths, are the nullspace over F_p of
 
     Q D_dependent - sum_k P_k D_k = 0      at more points of V than there are unknowns,
 
-homogeneous, since a coefficient has the unit of a power of a length. What is found is checked at fresh points by `certify`.
+each point a robot of its own, homogeneous, since a coefficient has the unit of a power of a length. What is found is checked at fresh points by
+`certify`. Where F_p gives no points, dependencies and coefficients are those of floats, at states closed by Newton near the start.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations_with_replacement
-from typing import Any
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations_with_replacement, product
 
 import numpy as np
 
-from symgen.derive.angles import Variable, primes_for
 from symgen.derive.columns import columns, element_names, inertial_names
-from symgen.derive.exact import Array, Draw, Fp, power
+from symgen.derive.exact import Array
 from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
-from symgen.derive.loop_equations import loop_system, residuals
+from symgen.derive.loop_equations import loop_system
 from symgen.derive.newton_euler import Motion
-from symgen.description.expression import Call, Expression, Number
+from symgen.description.expression import Expression
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.errors import SymgenError
+from symgen.regroup.closed_draw import ClosedDraw, Length, closed_draw
 from symgen.regroup.finite_field import rref, small_rational
 
 INDEPENDENT = 1e-7  # of a unit column: what the columns before it leave of an independent one
 SPREAD, MOST_STATES = 0.4, 4000  # rad about the start, and of half the longest length for slides
 DEGREES = range(4)  # of Q; units then fix the degree of every P
 MAX_UNKNOWNS = 1200
-
-Length = str | Number | Call
-
-
-class ClosedDraw(Draw):
-    """Random points of V: every sample has its own lengths and its own configuration, closed; raises ArithmeticError where that is no linear matter."""
-
-    def __init__(self, robot: Robot, seed: int, samples: int, *, p: int | None = None) -> None:
-        p = p if p is not None else primes_for(robot, 1)[0]
-        rng = np.random.default_rng([seed, 1])
-        self.lengths = lengths_of(robot)
-        self.drawn: dict[Variable, Array] = {v: rng.integers(1, p, samples) for v in self.lengths}
-        super().__init__(robot, seed, samples, p=p, geometry=self.drawn)
-        self.system = loop_system(robot)
-        self.tied = self.system.closure.tied
-        if any(loop.cut in self.tied for loop in robot.loops):
-            raise ArithmeticError("the orientations of a loop do not agree by construction")
-        self._close()
-        self._move()
-
-    def _residual(self) -> Array:
-        """(equations, samples)."""
-        return np.stack([self._array(x) for x in self.system.residual(self)])
-
-    def _array(self, x: Any) -> Array:
-        return np.broadcast_to(x.x if isinstance(x, Fp) else np.array([x % self.p]), (self.samples,))
-
-    def _close(self) -> None:
-        """Solve r = r0 + M u = 0 for lengths or strokes u, as many as equations; strokes of tied slides first, then the last lengths."""
-        strokes = [j for j in self.tied if self.robot.frame(j).sigma == PRISMATIC]
-        candidates: list[int | Length] = [*strokes, *reversed(self.lengths)]
-        for u in candidates:
-            self._put(u, np.zeros(self.samples, dtype=np.int64))
-        r0, columns_of = self._residual(), []
-        for u in candidates:
-            self._put(u, np.ones(self.samples, dtype=np.int64))
-            columns_of.append((self._residual() - r0) % self.p)
-            self._put(u, np.zeros(self.samples, dtype=np.int64))
-        m = len(r0)
-        M = np.stack(columns_of, axis=1)  # (m, candidates, samples)
-        pivots = rref(M[:, :, 0].copy(), self.p)[0]
-        if len(pivots) < m:
-            raise ArithmeticError("fewer lengths than closure equations")
-        rest = r0
-        for k, u in enumerate(candidates):
-            if k not in pivots:
-                value = self._random(self.samples)
-                self._put(u, value)
-                rest = (rest + M[:, k] * value) % self.p
-        for k, value in zip(pivots, self._solved(M[:, pivots], -rest % self.p), strict=True):
-            self._put(candidates[k], value)
-        whole = np.stack([self._array(x) for x in residuals(self.robot, self, self.system.closure)])
-        if whole.any():
-            raise ArithmeticError("the closure equations are not linear in the lengths, or the orientations do not agree")
-
-    def _put(self, u: int | Length, value: Array) -> None:
-        if isinstance(u, int):
-            self._q[u] = value
-        else:
-            self.drawn[u] = value
-            if isinstance(u, str):
-                self._constants[u] = value
-
-    def _move(self) -> None:
-        """Rates and accelerations of the tied joints."""
-        joints, n = self.robot.joints, len(self.robot.joints)
-        J = np.stack([np.stack([self._array(x) for x in row]) for row in self.system.jacobian(self)])
-        J_u = J[:, n:]
-        rates = np.stack([self._solved(J_u, -J[:, k] % self.p) for k in range(n)], axis=1)  # (tied, n, samples)
-        for a, u in enumerate(self.tied):
-            for k, i in enumerate(joints):
-                self._rate[u, i] = rates[a, k]
-            self._qd[u] = sum((rates[a, k] * self._qd[i] for k, i in enumerate(joints)), start=np.int64(0)) % self.p  # type: ignore[assignment]
-        B = np.stack([self._array(x) for x in self.system.curvature(self)])
-        bend = self._solved(J_u, -B % self.p)
-        for a, u in enumerate(self.tied):
-            total = bend[a]
-            for k, i in enumerate(joints):
-                total = (total + rates[a, k] * self._qdd[i]) % self.p
-            self._qdd[u] = total
-
-    def _solved(self, A: Array, b: Array) -> Array:
-        """x with A x = b sample by sample, A of shape (m, m, samples), by Gauss elimination; singular samples give ArithmeticError."""
-        p, m = self.p, len(b)
-        M = np.concatenate([A, b[:, None]], axis=1) % p
-        for c in range(m):
-            below = (M[c:, c] != 0).argmax(axis=0) + c
-            samples = np.arange(M.shape[2])
-            swap = M[below, :, samples].copy()
-            M[below, :, samples] = M[c, :, samples]
-            M[c, :, samples] = swap
-            if not M[c, c].all():
-                raise ArithmeticError("a singular draw")
-            M[c] = M[c] * power(M[c, c], p - 2, p) % p
-            for r in range(m):
-                if r != c:
-                    M[r] = (M[r] - M[r, c] * M[c]) % p
-        return M[:, m]
-
-    def regressor(self, names: Sequence[str]) -> Array:
-        """Columns `names`, shape (joints, samples, len(names))."""
-        D = columns(Motion(Geometry(self.robot, self, self.system.closure)), names)
-        return np.stack([np.stack([self._array(D[name].get(j, 0)) for name in names], axis=-1) for j in self.robot.joints])
-
-
-def closed_draw(robot: Robot, seed: int, samples: int, *, p: int | None = None) -> ClosedDraw:
-    """A ClosedDraw; a draw that happens to be singular is made again."""
-    for k in range(4):
-        try:
-            return ClosedDraw(robot, seed + 1000 * k, samples, p=p)
-        except ArithmeticError as error:
-            if str(error) != "a singular draw":
-                raise
-    raise ArithmeticError("only singular draws")
-
-
-def lengths_of(robot: Robot) -> tuple[Length, ...]:
-    """Constants, numbers and roots in b, d and r of the frames, in their order."""
-    found: dict[Length, None] = {}
-    for f in robot.frames:
-        for e in (f.b, f.d, f.r0):
-            for a in sorted(e.atoms, key=str):
-                if a != "pi":
-                    found[a] = None
-    return tuple(found)
+LARGEST_FACTOR, LARGEST_BELOW, MOST_MONOMIALS = 12, 2, 20_000  # of a monomial, lengths in its denominator, and monomials looked at
 
 
 class FloatStates:
@@ -252,20 +120,108 @@ def float_states(robot: Robot, names: Sequence[str]) -> int:
     return 3 * len(names) // len(robot.joints) + 10
 
 
-def base_and_relations(robot: Robot, names: tuple[str, ...]) -> tuple[tuple[str, ...], dict[str, dict[str, Expression]], bool]:
-    """Base columns among `names` (in order of preference), {dependent: {base column: coefficient}}, and whether all are exact."""
+def base_and_relations(robot: Robot, names: tuple[str, ...]) -> tuple[tuple[str, ...], dict[str, dict[str, Expression]], str]:
+    """Base columns among `names` (in order of preference), {dependent: {base column: coefficient}}, and why not all are exact, if so."""
+    try:
+        return _exact(robot, names)
+    except ArithmeticError as error:
+        reason = str(error)
     pivots, K = float_base(FloatStates(robot, 41).regressor(names, float_states(robot, names)))
     base = tuple(names[c] for c in pivots)
+    relations = {
+        name: {base[k]: Expression.number(repr(float(K[k, c]))) for k in np.flatnonzero(K[:, c])}
+        for c, name in enumerate(names)
+        if c not in pivots
+    }
+    found = {name: relation(robot, name, tuple(support)) if support else {} for name, support in relations.items()}
+    relations |= {name: e for name, e in found.items() if e is not None}
+    return base, relations, reason if None in found.values() else ""
+
+
+def _exact(robot: Robot, names: tuple[str, ...]) -> tuple[tuple[str, ...], dict[str, dict[str, Expression]], str]:
+    """By points of two geometries over F_p; raises ArithmeticError where there are none, or a coefficient is not found."""
+    states = len(names) // len(robot.joints) + 10
+    draws = [closed_draw(robot, seed, states, one_geometry=True) for seed in (11, 12)]
+    echelons = [rref(draw.regressor(names).reshape(-1, len(names)), draw.p) for draw in draws]
+    pivots = echelons[0][0]
+    if echelons[1][0] != pivots:
+        raise ArithmeticError("the rank differs from geometry to geometry")
+    base = tuple(names[c] for c in pivots)
+    monomials = Monomials(draws)
     relations: dict[str, dict[str, Expression]] = {}
-    exact = True
     for c, name in enumerate(names):
-        if c in pivots:
-            continue
-        support = {base[k]: float(K[k, c]) for k in np.flatnonzero(K[:, c])}
-        found = relation(robot, name, tuple(support)) if support else {}
-        exact &= found is not None
-        relations[name] = {b: Expression.number(repr(x)) for b, x in support.items()} if found is None else found
-    return base, relations, exact
+        if c not in pivots:
+            support = [k for k in range(len(base)) if any(R[k, c] for _, R in echelons)]
+            degree = {k: length_degree(robot, base[k]) - length_degree(robot, name) for k in support}
+            found = {base[k]: monomials.sum([int(R[k, c]) for _, R in echelons], degree[k]) for k in support}
+            few = {b: e for b, e in found.items() if e is not None}
+            known = few if len(few) == len(found) else relation(robot, name, tuple(found))
+            if known is None:
+                raise ArithmeticError(f"the coefficients of {name} are no fractions of moderate degree in the lengths")
+            relations[name] = known
+    return base, relations, ""
+
+
+@dataclass(frozen=True)
+class Monomial:
+    """A quotient of products of lengths, with its residues and theirs inverted at two geometries."""
+
+    above: Sequence[Length]
+    under: Sequence[Length]
+    residues: Sequence[int]
+    inverse: Sequence[int]
+
+    @property
+    def expression(self) -> Expression:
+        e = Expression.number(1)
+        for v, n in (*((v, 1) for v in self.above), *((v, -1) for v in self.under)):
+            e = e * Expression({((v, n),): Fraction(1)})
+        return e
+
+
+class Monomials:
+    """Coefficients that are a multiple of a monomial of lengths, or a sum or difference of two, by their residues at two geometries."""
+
+    def __init__(self, draws: Sequence[ClosedDraw]) -> None:
+        self.p = draws[0].p
+        self.lengths = draws[0].lengths
+        self.values = [{v: int(draw.drawn[v][0]) for v in self.lengths} for draw in draws]
+        self.inverse = [{v: pow(x, -1, self.p) for v, x in values.items()} for values in self.values]
+        self.tables: dict[tuple[int, int], list[Monomial]] = {}
+
+    def sum(self, residues: Sequence[int], degree: int) -> Expression | None:
+        """The coefficient of that degree, or None; those with few lengths below come first."""
+        known: list[Monomial] = []
+        for below in range(LARGEST_BELOW + 1):
+            known += (new := self._table(degree, below))
+            if len(known) > MOST_MONOMIALS:
+                return None
+            for m in new:
+                c, other = (x * i % self.p for x, i in zip(residues, m.inverse, strict=True))
+                if c == other and (factor := small_rational(c, self.p, LARGEST_FACTOR)) is not None:
+                    return m.expression * factor
+            place = {m.residues[0]: m for m in known}
+            for m, sign, other in product(known, (1, -1), (1, -1)):
+                n = place.get(other * (residues[0] - sign * m.residues[0]) % self.p)
+                if n is not None and (sign * m.residues[1] + other * n.residues[1] - residues[1]) % self.p == 0:
+                    return m.expression * sign + n.expression * other
+        return None
+
+    def _table(self, degree: int, below: int) -> list[Monomial]:
+        """Quotients with so many lengths below."""
+        if (degree, below) not in self.tables:
+            pairs = product(_products(self.lengths, degree + below), _products(self.lengths, below))
+            self.tables[degree, below] = [self._monomial(above, under) for above, under in pairs if not {*above} & {*under}]
+        return self.tables[degree, below]
+
+    def _monomial(self, above: Sequence[Length], under: Sequence[Length]) -> Monomial:
+        residues, inverse = [1, 1], [1, 1]
+        for k in (0, 1):
+            for v in above:
+                residues[k], inverse[k] = residues[k] * self.values[k][v] % self.p, inverse[k] * self.inverse[k][v] % self.p
+            for v in under:
+                residues[k], inverse[k] = residues[k] * self.inverse[k][v] % self.p, inverse[k] * self.values[k][v] % self.p
+        return Monomial(above, under, residues, inverse)
 
 
 def length_degree(robot: Robot, name: str) -> int:

@@ -27,7 +27,7 @@ from symgen.regroup.solve import coefficients, numeric_coefficients, sample, sta
 
 FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
 EXACT = "exact over F_p"
-NUMERIC = "numeric, for the constants of the robot file; coefficients not recognised"
+NUMERIC = "numeric, for the constants of the robot file"
 LAST_CHOICE = ("MZ", "M", "YY")
 
 
@@ -69,7 +69,7 @@ class Regrouping:
     steps : tuple of (from, into, coefficient)
         The recursive form: each standard parameter that goes, and where.
     method : str
-        How the coefficients were derived: EXACT, RECOGNISED or NUMERIC.
+        How the coefficients were derived: EXACT, or NUMERIC and why.
     """
 
     robot: Robot
@@ -141,15 +141,22 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
     betas = exact | {name: numeric_coefficients(given, name, supports[name]) for name in missing}
     relations = {name: dict(zip(supports[name], betas.get(name, []), strict=True)) for name in supports}
     regrouping = _assemble(robot, transfer, base, relations, draw)
-    return replace(regrouping, robot=given, method=NUMERIC if missing else EXACT)
+    return replace(regrouping, robot=given, method=f"{NUMERIC}; {_reason(missing)}" if missing else EXACT)
+
+
+def _reason(missing: Mapping[str, str]) -> str:
+    """Why coefficients were not recognised: of the first column, and how many more there are."""
+    name, reason = next(iter(missing.items()))
+    return f"coefficients of {name}{f' and {len(missing) - 1} more' if len(missing) > 1 else ''} not recognised: {reason}"
 
 
 regrouping = regroup  # its public name, symgen.regrouping: symgen.regroup is the package
 
 
 def _regroup_general(robot: Robot, transfer: Transfer, names: tuple[str, ...]) -> Regrouping:
-    base, relations, exact = base_and_relations(robot, names)
-    return replace(_assemble(robot, transfer, base, relations, Draw(robot, 1, 1)), method=EXACT if exact else NUMERIC)
+    base, relations, reason = base_and_relations(robot, names)
+    method = f"{NUMERIC}; {reason}" if reason else EXACT
+    return replace(_assemble(robot, transfer, base, relations, Draw(robot, 1, 1)), method=method)
 
 
 def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
