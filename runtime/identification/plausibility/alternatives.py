@@ -87,8 +87,7 @@ def alternatives(
     sides : (str, str)
         Sides of positions and torques in the files: motor or joint.
     """
-    n = len(model.JOINTS)
-    make = _Maker(model, n)
+    make = _Maker(model, sides)
     every = [*signs(make), *exchanges(make), *units(make), *rates(make), *couplings(make), *zeros(make)]
     if (drives := drives_of(model)) is not None:
         every += transmissions(make, drives, sides)
@@ -98,40 +97,44 @@ def alternatives(
 
 
 class _Maker:
-    """Alternatives of a robot of n joints: what is not given stays as it is."""
+    """Alternatives of a robot of n joints: what is not given stays as it is. Maps of columns act on the side that the files have."""
 
-    def __init__(self, model: GeneratedModel, n: int) -> None:
-        self.n, self.joints, self.one = n, [str(j) for j in model.JOINTS], np.eye(n)
+    def __init__(self, model: GeneratedModel, sides: Sequence[str]) -> None:
+        self.n = n = len(model.JOINTS)
+        self.joints, self.one = [str(j) for j in model.JOINTS], np.eye(n)
         self.units = joint_units(model)
+        drives = drives_of(model)
+        self.R, self.tau_of_motors, self.offset = self.one, self.one, np.zeros(n)
+        if drives is not None and sides[0] == "motor":
+            self.R, self.offset = drives.ratio, drives.offset
+        if drives is not None and sides[1] == "motor":
+            self.tau_of_motors = drives.ratio.T
 
     def __call__(self, kind: str, cause: str, remedy: str, **changed: Any) -> Alternative:
         given = {"P": self.one, "p": np.zeros(self.n), "T": self.one} | changed
         return Alternative(cause, remedy, kind, **given)
+
+    def positions(self, E: Array) -> dict[str, Array]:
+        """The map E of the columns of positions: q' = R^-1 E R (q - offset) + offset on the side of motors."""
+        P = np.linalg.inv(self.R) @ E @ self.R
+        return {"P": P, "p": self.offset - P @ self.offset}
+
+    def torques(self, E: Array) -> dict[str, Array]:
+        """The map E of the columns of torques."""
+        return {"T": self.tau_of_motors @ E @ np.linalg.inv(self.tau_of_motors)}
 
 
 def signs(make: _Maker) -> Iterator[Alternative]:
     """Positions, torques, or both of one joint with the other sign; of all joints."""
     for j, joint in enumerate(make.joints):
         S = np.diag(np.where(np.arange(make.n) == j, -1.0, 1.0))
-        yield make(
-            "sign",
-            f"the torque of joint {joint} has the wrong sign",
-            f"turn the sign of the torque of joint {joint}: ratio, torque constant or column",
-            T=S,
-        )
-        yield make(
-            "sign",
-            f"the position of joint {joint} has the wrong sign",
-            f"turn the sign of the position of joint {joint}, or its axis in the robot file",
-            P=S,
-        )
-        yield make(
-            "sign",
-            f"joint {joint} counts in the other sense, position and torque",
-            f"turn the sign of the ratio of joint {joint}, or alpha and theta of its frame",
-            P=S,
-            T=S,
-        )
+        torque, position = make.torques(S), make.positions(S)
+        remedy = f"turn the sign of the torque of joint {joint}: ratio, torque constant or column"
+        yield make("sign", f"the torque of joint {joint} has the wrong sign", remedy, **torque)
+        remedy = f"turn the sign of the position of joint {joint}, or its axis in the robot file"
+        yield make("sign", f"the position of joint {joint} has the wrong sign", remedy, **position)
+        remedy = f"turn the sign of the ratio of joint {joint}, or alpha and theta of its frame"
+        yield make("sign", f"joint {joint} counts in the other sense, position and torque", remedy, **torque, **position)
     if make.n > 1:
         yield make("sign", "all torques have the wrong sign", "turn the sign of the torques", T=-make.one)
         yield make("sign", "all positions have the wrong sign", "turn the sign of the positions", P=-make.one)
@@ -150,12 +153,11 @@ def exchanges(make: _Maker) -> Iterator[Alternative]:
             (list(np.roll(np.arange(make.n), by)), "order", f"are moved by one joint {way}") for by, way in ((1, "back"), (-1, "on"))
         ]
     for order, kind, text in orders:
-        E = make.one[order]
-        yield make(kind, f"the position columns {text}", "name the position columns in the order of the joints (record.columns.q)", P=E)
-        yield make(kind, f"the torque columns {text}", "name the torque columns in the order of the joints (record.columns.tau)", T=E)
-        yield make(
-            kind, f"the columns of positions and torques {text}", "name the columns in the order of the joints (record.columns)", P=E, T=E
-        )
+        torque, position = make.torques(make.one[order]), make.positions(make.one[order])
+        remedy = "name the columns in the order of the joints (record.columns.{})"
+        yield make(kind, f"the position columns {text}", remedy.format("q"), **position)
+        yield make(kind, f"the torque columns {text}", remedy.format("tau"), **torque)
+        yield make(kind, f"the columns of positions and torques {text}", remedy.format("q and tau"), **position, **torque)
 
 
 def units(make: _Maker) -> Iterator[Alternative]:

@@ -28,7 +28,7 @@ STEP = 1e-4
 """Finite difference, rad, m, or relative."""
 WORTH = 0.4
 """Gain of the first step over DECISIVE from which a number is searched."""
-SEARCHED = 5
+SEARCHED = 4
 """Numbers searched at most."""
 
 
@@ -192,28 +192,35 @@ def searched(problem: Problem) -> list[Trial]:
 
 
 def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
+    """The best value by a coarse grid and golden section, each fit from the one before."""
+    chi = problem.given.X
+    scores: dict[float, float] = {}
+
     def score(xi: float) -> float:
+        nonlocal chi
         alternative = quantity.change(xi)
         grams = problem.grams(alternative)
         if grams is None:
             return np.inf
         volume = problem.N * float(np.linalg.slogdet(alternative.T)[1])
-        return quick_fit(problem.standard(grams), problem.barrier, problem.N, problem.free.sigma, problem.given.X).score - volume
+        fit = quick_fit(problem.standard(grams), problem.barrier, problem.N, problem.free.sigma, chi)
+        chi, scores[xi] = fit.X, fit.score - volume
+        return scores[xi]
 
     near = float(np.clip(step.xi, -quantity.span, quantity.span))
-    grid = [near * f for f in (0.5, 1.0, 1.6)] + [-0.5 * quantity.span, 0.5 * quantity.span]
-    grid = sorted({float(np.clip(x, -quantity.span, quantity.span)) for x in grid})
-    best = min(grid, key=score)
-    width = max(abs(best) * 0.5, 2 * min(step.sigma, 0.25 * quantity.span))
-    found = minimize_scalar(
-        score, bounds=(max(best - width, -quantity.span), min(best + width, quantity.span)), method="bounded", options={"maxiter": 12}
-    )
-    xi = float(found.x) if found.fun < score(best) else best
-    alternative = quantity.change(xi)
+    for xi in sorted({near * 0.5, near, float(np.clip(1.6 * near, -quantity.span, quantity.span))}):
+        score(xi)
+    if not scores or min(scores.values()) > problem.given.score - 0.5 * WORTH * DECISIVE:
+        return None
+    best = min(scores, key=lambda xi: scores[xi])
+    width = 0.5 * abs(best)
+    bounds = max(best - width, -quantity.span), min(best + width, quantity.span)
+    minimize_scalar(score, bounds=bounds, method="bounded", options={"maxiter": 7})
+    alternative = quantity.change(min(scores, key=lambda xi: scores[xi]))
     grams = problem.grams(alternative)
     if grams is None:
         return None
     volume = problem.N * float(np.linalg.slogdet(alternative.T)[1])
-    fit = physical_fit(problem.standard(grams), problem.barrier, problem.N, problem.free.sigma, problem.given.X)
+    fit = physical_fit(problem.standard(grams), problem.barrier, problem.N, problem.free.sigma, chi)
     gain = problem.given.score - fit.score + volume - 0.5 * np.log(problem.N)  # one parameter more
     return Trial(alternative, -np.inf, fit, float(gain))

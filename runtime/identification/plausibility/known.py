@@ -17,10 +17,12 @@ from runtime.model.inertia import INERTIAL
 
 Array = np.ndarray
 
-SMALL = 0.1
+SMALL = 0.2
 """Part of the torque, root mean square over that of the record, below which it has no ratio."""
-NEAR = (0.6, 1.6)
-"""Ratios that CAD values may have."""
+NEAR = (1 / 3, 3.0)
+"""Ratios that CAD values may have, loads included."""
+LEFT = 30.0
+"""Error, %, that CAD values with fitted friction may leave."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +48,15 @@ class KnownValues:
 
     @property
     def off(self) -> tuple[str, ...]:
-        """The ratios outside NEAR, in words."""
+        """The ratios outside NEAR, and errors above LEFT, in words."""
         texts = []
         for name, ratios in (("gravity", self.gravity), ("inertia", self.inertia)):
             for joint, ratio in zip(self.joints, ratios, strict=True):
                 if np.isfinite(ratio) and not NEAR[0] <= ratio <= NEAR[1]:
                     texts.append(f"{name} torque of joint {joint} {ratio:.2f} times that of the values")
+        for joint, error in zip(self.joints, self.error, strict=True):
+            if self.complete and error > LEFT and not any(f"of joint {joint} " in text for text in texts):
+                texts.append(f"they leave {error:.0f} % of the torque of joint {joint} unexplained, friction fitted")
         return tuple(texts)
 
     def summary(self) -> dict[str, Any]:

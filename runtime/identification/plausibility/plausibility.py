@@ -233,7 +233,7 @@ def size(model: GeneratedModel, problem: Problem) -> Check | None:
     from runtime.identification.plausibility.trials import FARTHEST, reach
 
     question, limit = "Do the torques suit the size of the robot?", f"{DENSITY[0]:g} to {DENSITY[1]:g} kg per cubic metre of reach"
-    length = reach(model)
+    length = reach(model, problem.samples.q)
     physical = problem.physical
     masses = sum(problem.given.X[physical.link(j)[-1]] for j in physical.links)
     if not physical.links or length > FARTHEST or length <= 0.1:
@@ -248,7 +248,7 @@ def size(model: GeneratedModel, problem: Problem) -> Check | None:
 def values(known: KnownValues) -> Check:
     """The values of the robot file, by joint."""
     question = "Do the values of the robot file agree with the record?"
-    limit = "gravity and inertia torques 0.6 to 1.6 times those of the values"
+    limit = "gravity and inertia torques a third to three times those of the values"
     remedy = (
         "look at ratio, torque constant and sign of that joint, at the load, and at what the model leaves out: a counterbalance or a cable is "
         "subtracted as record.columns.tau_known; or the values are those of another robot"

@@ -25,6 +25,8 @@ ALIKE = 0.25
 """Alternatives within this share of the best gain are named with it."""
 NAMED = 6
 """Alternatives named at most."""
+LOOKED_AT = 48
+"""Alternatives fitted under the conditions of a physical robot, those of the best least squares."""
 REFINED = 10
 """Alternatives fitted to the end."""
 FARTHEST = 20.0
@@ -113,7 +115,7 @@ def problem_of(model: GeneratedModel, samples: Samples, variants: GeneratedModel
     mask, Y = samples.moving(), samples.tau - samples.known
     base = Grams.of(D, Y, mask)
     N = counting_rows(D, Y, mask, least_squares(base, 1.0).X)
-    size = reach(model)
+    size = reach(model, samples.q)
     size = size if size < FARTHEST else 1.0
     torque = float(np.sqrt((Y**2).mean(axis=0)).max()) or 1.0
     barrier = Barrier(physical, max(torque / (9.81 * size), 1e-3), 0.3 * size, 0.01 * torque, values=values)
@@ -133,15 +135,14 @@ def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
     return float(np.mean(counts)) if counts else 1.0
 
 
-def reach(model: GeneratedModel) -> float:
-    """Length of the robot, m: distance of the farthest frame over random positions, at least 0.1."""
+def reach(model: GeneratedModel, q: Array) -> float:
+    """Length of the robot, m: largest distance of a frame from the first one in the positions q, shape (K, n); at least 0.1, 1 where not known."""
     poses = getattr(model, "frame_poses", None)
     if poses is None:
         return 1.0
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (32, len(model.JOINTS)))
     try:
         with np.errstate(all="ignore"):
-            P = np.asarray(poses(q))[:, :, :3, 3]
+            P = np.asarray(poses(q[:: max(1, len(q) // 32)]))[:, :, :3, 3]
     except ValueError:
         return 1.0
     distance = np.linalg.norm(P - P[:, :1], axis=-1)
@@ -168,7 +169,7 @@ def tried(
     quick = []
     best = given.score - DECISIVE
     for bound, volume, alternative, grams, sigma in bounds:
-        if bound < best + ALIKE * (given.score - best):
+        if len(quick) < LOOKED_AT and bound < best + ALIKE * (given.score - best):
             standard = problem.standard(grams)
             score = quick_fit(standard, problem.barrier, problem.N, sigma, given.X).score - volume
             best = min(best, score)

@@ -1,0 +1,232 @@
+"""Right studies of three robots and slips in them: what the verdict has to name. The list of the first 25 is that of the issue; 15 are our own.
+
+A Case holds what a user gives: the text of a robot file, positions and torques of a log, sides and rate. A slip changes one thing. `told` says what
+became of it: named (a finding names the cause, in a list of at most six), wrong (findings, none of them the cause), silent.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import runtime
+import symgen
+from runtime.errors import InputError
+from runtime.model.drives import Drives
+from runtime.settings.study import study_from_mapping
+from symgen.description.yaml import parse_robot
+from symgen.errors import SymgenError
+
+Array = np.ndarray
+Plain = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A study before anything is read: q in rad on `side`, tau in N m on `torque_side`, known torques of the joints."""
+
+    robot: str
+    t: Array
+    q: Array
+    tau: Array
+    side: str = "joint"
+    torque_side: str = "motor"
+    known: Array | None = None
+    study: Plain | None = None
+    rate: float = 1.0
+    values: bool = False
+
+    def text(self, old: str, new: str) -> Case:
+        assert old in self.robot, old
+        return replace(self, robot=self.robot.replace(old, new, 1))
+
+    def judged(self) -> Any:
+        """The Plausibility, or the error that stops the study, as a text."""
+        try:
+            robot = parse_robot(self.robot.encode(), "robot.yaml")
+            model = symgen.model(robot)
+            drives = None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
+            q, tau = self.q, self.tau
+            if self.side == "motor":
+                q = drives.joint_position(q)
+            if self.torque_side == "motor":
+                tau = drives.joint_torque(tau)
+            record = runtime.Record(self.t / self.rate, q, tau, **({} if self.known is None else {"tau_known": self.known}))
+            settings = {"record": {"files": ["log.npz"], "side": self.side, "torque_side": self.torque_side}, **(self.study or {})}
+            return runtime.plausibility(model, record, study_from_mapping(settings), variants=symgen.variants(robot))
+        except (InputError, SymgenError) as e:
+            return str(e)
+
+
+@dataclass(frozen=True)
+class Slip:
+    """change : Case -> Case, or None where it does not apply.   cause : pattern that a finding which names it matches."""
+
+    number: int
+    name: str
+    cause: str
+    change: Callable[[Case], Case | None]
+
+
+def told(case: Case, slip: Slip, usual: set[str]) -> tuple[str, str]:
+    """named, wrong or silent, and the findings. usual : questions that the right study is told as well."""
+    result = case.judged()
+    if isinstance(result, str):
+        return ("named" if re.search(slip.cause, result, re.IGNORECASE) else "wrong"), result
+    findings = [f"{c.finding}. {c.remedy}" for c in result.checks if c.state in ("no", "doubtful") and c.question not in usual]
+    if any(re.search(slip.cause, text, re.IGNORECASE) for text in findings):
+        return "named", " | ".join(findings)
+    return ("wrong" if findings else "silent"), " | ".join(findings)
+
+
+def columns(*order: int) -> Callable[[Array], Array]:
+    return lambda x: x[:, list(order)]
+
+
+def factor(j: int, f: float, n: int) -> Array:
+    return np.where(np.arange(n) == j, f, 1.0)
+
+
+# --- KUKA KR300 ---------------------------------------------------------------------------------------------------------------------------------------
+
+CAREFUL: Plain = {"signals": {"median": 1, "lowpass": {"cutoff": 10}}, "rows": {"window": [1.8, 8.2], "low_speed": 0.02}}
+
+
+def kr300(folder: Path, letter: str = "A", *, values: bool = False, counterbalance: bool = True, careful: bool = True) -> Case:
+    from scipy.io import loadmat
+
+    raw = loadmat(folder / f"{letter}.mat", squeeze_me=True, struct_as_record=False)["rec"]
+    text = (folder / "kr300.yaml").read_text()
+    q = np.deg2rad(raw.act_pos_mot_deg.T)
+    known = np.zeros_like(q)
+    known[:, 1] = counterbalance_torque(q[:, 1])
+    settings = CAREFUL if letter == "A" else {**CAREFUL, "rows": {"low_speed": 0.02}}
+    return Case(
+        robot=text + (f"values: {{{', '.join(f'{k}: {v:.9g}' for k, v in kr300_values().items())}}}\n" if values else ""),
+        t=raw.time_cont,
+        q=q,
+        tau=raw.act_torque_abs_nm.T,
+        known=known if counterbalance else None,
+        study=settings if careful else {},
+        values=values,
+    )
+
+
+def counterbalance_torque(q2: Array) -> Array:
+    """Hydraulic counterbalance of axis 2, N m, by the README of the record."""
+    delta = q2 + np.deg2rad(95)
+    length = np.sqrt(0.8**2 + 0.2**2 - 2 * 0.8 * 0.2 * np.cos(delta))
+    area = np.pi * (0.055**2 - 0.030**2) / 4
+    pressure = 1.01 * 296.8 * 328 * 0.159 / (0.00096 - (length - 0.6) * area)
+    return 0.8 * 0.2 * np.sin(delta) / length * pressure * area
+
+
+# mass, centre of mass and inertia about it in the distal frame, d and alpha from there to Khalil's frame, rotor inertia and ratio:
+# facts of robot_model/model_KUKA_Quantec_Ultra_KR300.m of the source of the record, with its load of 200 kg
+LINKS = (
+    (395.40, (-0.353, 0.174, -0.004), (16.733765, 29.799119, 32.814954, -1.703664, 0.129384, 4.404062), 0.35, np.pi / 2, 0.00923, 1798 / 7),
+    (339.12, (-0.709, -0.001, 0.023), (7.507819, 88.886691, 88.673761, 0.430046, 0.173157, -4.396607), 1.15, 0.0, 0.0118, 1872 / 7),
+    (105.21, (-0.018, -0.018, -0.076), (10.783798, 10.186135, 1.943179, 0.118474, -0.606384, -0.10195), 0.041, -np.pi / 2, 0.0118, 757 / 3),
+    (35.80, (0.0, 0.236, 0.001), (0.425035, 0.217993, 0.428465, -4e-6, -0.011353, -2.7e-5), 0.0, np.pi / 2, 0.00173, 221.0),
+    (31.46, (0.0, -0.080, -0.009), (0.283826, 0.229562, 0.258266, -4e-6, -0.019521, -0.00012), 0.0, -np.pi / 2, 0.00173, 5032 / 21),
+    (217.78, (0.0, 0.0, 19.111 / 217.78), (0.0,) * 6, 0.0, np.pi, 0.00173, 206793 / 1340),
+)
+BESIDE = {2: -0.189, 6: -0.24}  # r that the robot file leaves out, m
+
+
+def kr300_values() -> dict[str, float]:
+    """Standard parameters in Khalil's frames, about their origins."""
+    values = {}
+    for j, (m, r, (xx, yy, zz, xy, yz, xz), d, alpha, rotor, ratio) in enumerate(LINKS, start=1):
+        c, s = np.cos(alpha), np.sin(alpha)
+        R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+        P = R @ r + [d, 0, BESIDE.get(j, 0.0)]
+        J = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T + m * (P @ P * np.eye(3) - np.outer(P, P))
+        values |= {f"{name}{j}": J[i, k] for name, i, k in (("XX", 0, 0), ("XY", 0, 1), ("XZ", 0, 2), ("YY", 1, 1), ("YZ", 1, 2), ("ZZ", 2, 2))}
+        values |= {f"M{axis}{j}": m * x for axis, x in zip("XYZ", P, strict=True)} | {f"M{j}": m, f"Ia{j}": rotor * ratio**2}
+    return {name: float(value) for name, value in values.items()}
+
+
+def _kr300_classic(case: Case) -> Case:
+    """The classic table, in the columns of Khalil's."""
+    rows = {1: ("pi/2", "A1"), 2: ("0", "A2"), 3: ("-pi/2", "A3"), 4: ("pi/2", "0"), 5: ("-pi/2", "0"), 6: ("0", "0")}
+    old = {1: ("pi", "0"), 2: ("pi/2", "A1"), 3: ("0", "A2"), 4: ("-pi/2", "A3"), 5: ("pi/2", "0"), 6: ("-pi/2", "0")}
+    lines = case.robot.split("\n")
+    for i, line in enumerate(lines):
+        if m := re.match(r"  ([1-6]): {ant", line):
+            j = int(m[1])
+            lines[i] = re.sub(r"alpha: *[^,]+, *d: *[^,]+,", f"alpha: {rows[j][0]}, d: {rows[j][1]},", line)
+            assert lines[i] != line or rows[j] == old[j]
+    return replace(case, robot="\n".join(lines))
+
+
+def _constants(case: Case, torque_constant: str) -> Case:
+    """Torques of the motors as they are, torque constants of the robot file applied to them."""
+    robot = parse_robot(case.robot.encode(), "robot.yaml")
+    constants = np.array([float(x) for x in torque_constant.split(",")])
+    text = case.robot.replace("drives:\n", f"drives:\n  torque_constant: [{torque_constant}]\n", 1)
+    assert len(constants) == len(robot.joints)
+    return replace(case, robot=text)
+
+
+KR300 = (
+    Slip(1, "ratio of joint 3 negative", r"torque of joint 3 has the wrong sign|joint 3 counts", lambda c: c.text("757/3", "-757/3")),
+    Slip(2, "degrees taken for rad", r"degrees", lambda c: replace(c, q=np.rad2deg(c.q))),
+    Slip(3, "position columns 2 and 3 exchanged", r"position columns of joints 2 and 3", lambda c: replace(c, q=columns(0, 2, 1, 3, 4, 5)(c.q))),
+    Slip(4, "torque columns 4 and 5 exchanged", r"torque columns of joints 4 and 5", lambda c: replace(c, tau=columns(0, 1, 2, 4, 3, 5)(c.tau))),
+    Slip(5, "joints in reverse order", r"reverse order", lambda c: replace(c, q=c.q[:, ::-1], tau=c.tau[:, ::-1])),
+    Slip(6, "gravity with the wrong sign", r"gravity (has|points)|it is \(.*-1.00\)", lambda c: c.text("[0, 0, -g]", "[0, 0, g]")),
+    Slip(7, "gravity along y", r"gravity (has|points)|it is \(.*-1.00\)", lambda c: c.text("[0, 0, -g]", "[0, -g, 0]")),
+    Slip(8, "alpha of frame 4 with the wrong sign", r"alpha of frame 4", lambda c: c.text("ant: 3, sigma: 0, alpha: -pi/2", "ant: 3, sigma: 0, alpha: pi/2")),
+    Slip(9, "alpha of frame 2 with the wrong sign", r"alpha of frame 2", lambda c: c.text("ant: 1, sigma: 0, alpha: pi/2", "ant: 1, sigma: 0, alpha: -pi/2")),
+    Slip(10, "theta of frame 3 without pi", r"theta of joint 3", lambda c: c.text("q3 + pi", "q3")),
+    Slip(11, "time stamps in ms", r"units\.t|record\.rate", lambda c: replace(c, t=1e3 * c.t)),
+    Slip(12, "rate 1000 for 250", r"sampling rate is 1/4", lambda c: replace(c, rate=4.0, study={**c.study, "rows": {"window": [0.45, 2.05], "low_speed": 0.08}, "signals": {"median": 1, "lowpass": {"cutoff": 40}}})),
+    Slip(13, "ratio forgotten", r"gear|torque_side", lambda c: replace(c, torque_side="joint")),
+    Slip(14, "torque said to be current", r"torque constant", lambda c: _constants(c, "1.2, 1.4, 1.4, 0.6, 0.6, 0.6")),
+    Slip(15, "torque of joint 2 times 1.41", r"torque of joint 2 is to be multiplied|of joint 2 \d", lambda c: replace(c, tau=c.tau * factor(1, 1.41, 6))),
+    Slip(16, "sense of joint 4 turned", r"joint 4 counts", lambda c: replace(c, q=c.q * factor(3, -1, 6), tau=c.tau * factor(3, -1, 6))),
+    Slip(17, "secondary encoders: axes 4 to 6 zero", r"4, 5, 6 stand still", lambda c: replace(c, q=c.q * [1, 1, 1, 0, 0, 0])),
+    Slip(18, "torque 20 ms late", r"Torques are late", lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 5, axis=0), c.tau[:-5]]))),
+    Slip(19, "classic table without convention", r"convention", _kr300_classic),
+    Slip(20, "alpha in degrees", r"alpha|degrees", lambda c: c.text("ant: 3, sigma: 0, alpha: -pi/2", "ant: 3, sigma: 0, alpha: -90")),
+    Slip(21, "A2 = 1.5 for 1.15", r"d of frame 3 is", lambda c: c.text("A2: 1.15", "A2: 1.5")),
+    Slip(23, "D4 in mm", r"r of frame 4|longest link ends at frame 4", lambda c: c.text("D4: 1.0", "D4: 1000.0")),
+    Slip(24, "theta of frame 3 wrong by 90 degrees", r"theta of joint 3|zero of joint 3", lambda c: c.text("q3 + pi", "q3 + pi/2")),
+    Slip(25, "ratios of joints 4 and 5 exchanged", r"ratios of joints 4 and 5", lambda c: replace(c, tau=c.tau * [1, 1, 1, 5032 / 21 / 221, 221 / (5032 / 21), 1])),
+    Slip(26, "zero of joint 3 off by 20 degrees", r"zero of joint 3", lambda c: replace(c, q=c.q + np.deg2rad(20) * (np.arange(6) == 2))),
+    Slip(27, "torque of joint 5 in kp m", r"torque of joint 5 is to be multiplied by (8|9|10|11)", lambda c: replace(c, tau=c.tau * factor(4, 1 / 9.81, 6))),
+    Slip(28, "position columns moved by one", r"position columns are moved by one", lambda c: replace(c, q=np.roll(c.q, 1, axis=1))),
+    Slip(29, "torque columns moved by one", r"torque columns are moved by one", lambda c: replace(c, tau=np.roll(c.tau, -1, axis=1))),
+    Slip(30, "joint positions taken for those of motors", r"positions of the joints|record\.side", lambda c: replace(c, side="motor")),
+    Slip(31, "all torques negative", r"torques have the wrong sign", lambda c: replace(c, tau=-c.tau)),
+    Slip(32, "mounted on a wall in the file", r"gravity points|it is \(", lambda c: c.text("[0, 0, -g]", "[g, 0, 0]")),
+    Slip(33, "alpha of frame 5 zero", r"alpha of frame 5", lambda c: c.text("ant: 4, sigma: 0, alpha: pi/2", "ant: 4, sigma: 0, alpha: 0")),
+    Slip(34, "torque 12 ms early", r"Torques are early", lambda c: replace(c, tau=np.vstack([c.tau[3:], np.repeat(c.tau[-1:], 3, axis=0)]))),
+    Slip(35, "position of joint 2 with the wrong sign", r"position of joint 2 has the wrong sign|alpha of frame 2|theta of joint 2", lambda c: replace(c, q=c.q * factor(1, -1, 6))),
+    Slip(36, "rate 100 for 250", r"sampling rate is 2.5 times", lambda c: replace(c, rate=0.4, study={**c.study, "rows": {"window": [4.5, 20.5], "low_speed": 0.008}, "signals": {"median": 1, "lowpass": {"cutoff": 4}}})),
+    Slip(37, "A3 and D4 exchanged", r"frame 4", lambda c: c.text("A3: 0.041", "A3: 1.0").text("D4: 1.0", "D4: 0.041")),
+    Slip(38, "joint 4 in degrees, the others in rad", r"joint 4.*degrees", lambda c: replace(c, q=c.q * factor(3, 180 / np.pi, 6))),
+    Slip(39, "theta of frame 2 with the wrong sign of pi/2", r"theta of joint 2|alpha of frame 2", lambda c: c.text("q2 - pi/2", "q2 + pi/2")),
+    Slip(40, "another robot's values: masses of a third", r"times that of the values", lambda c: _masses(c, 1 / 3) if c.values else None),
+)  # 22 is equivalent, and so is 40 without values
+
+
+def _masses(case: Case, f: float) -> Case:
+    """The values of all links scaled."""
+    head, values = case.robot.split("values: {")
+    scaled = re.sub(r": ([-+.e0-9]+)", lambda m: f": {f * float(m[1]):.9g}", values)
+    return replace(case, robot=f"{head}values: {{{scaled}")
+
+
+def campaigns(folder: Path) -> list[tuple[str, Case, tuple[Slip, ...]]]:
+    """Name, right study and slips."""
+    return [
+        ("kr300 values", kr300(folder / "kr300", values=True), KR300),
+        ("kr300 plain", kr300(folder / "kr300"), KR300),
+    ]
