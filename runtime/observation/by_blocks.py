@@ -13,11 +13,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from runtime.errors import InputError, SettingsError
+from runtime.errors import InputError
 from runtime.model.generated import GeneratedModel
-from runtime.observation.filters import States, decimation_factor, decimation_plan, kept_samples
+from runtime.observation.counts_by_blocks import CountStage
+from runtime.observation.filters import SpeedErrors, States, decimation_factor, decimation_plan, kept_samples
 from runtime.observation.regressor_signals import DistinctSignals, Entries
 from runtime.observation.rows import per_joint
+from runtime.observation.states import certain_rows, encoder_drives, encoder_position, encoder_root
 from runtime.observation.streaming_filters import (
     Chain,
     Stage,
@@ -69,8 +71,8 @@ class Layout:
     dropped: Mapping[str, tuple[int, ...]]
 
 
-def layout(stream: Stream, study: Study) -> Layout:
-    """Window, decimation and rows of a record; the record is read and filtered only where rows are left out by speed."""
+def layout(model: GeneratedModel, stream: Stream, study: Study, constants: Mapping[str, float]) -> Layout:
+    """Window, decimation and rows of a record; the record is read and filtered only where rows are left out by speed or direction."""
     rows, signals = study.rows, study.signals
     start, stop = _window(stream, *rows.window)
     factor = decimation_factor(signals, stream.rate)
@@ -83,33 +85,40 @@ def layout(stream: Stream, study: Study) -> Layout:
             file=stream.name,
         )
     at = Layout(start, stop, factor, int(instants[0]), K, (), (), np.inf, -np.inf, {})
-    counts, shown, k = np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
-    for t, mask in _instants(stream, study, at):
+    counts, fast, shown, k = np.zeros(n, dtype=int), np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
+    for t, mask, certain in _instants(model, stream, study, at, constants):
+        fast += mask.sum(axis=1)
+        mask = mask & certain
         counts += mask.sum(axis=1)
         shown += mask[:, : max(SHOWN - k, 0)].sum(axis=1)
         k += len(t)
         used = t[mask.any(axis=0)]
         if len(used):
             at = replace(at, t0=min(at.t0, float(used[0])), t1=max(at.t1, float(used[-1])))
-    dropped = {"trim": (2 * rows.trim,) * n, "low_speed": tuple((K - 2 * rows.trim - counts).tolist()), "mask": (0,) * n}
+    dropped = {"trim": (2 * rows.trim,) * n, "low_speed": tuple((K - 2 * rows.trim - fast).tolist()), "mask": (0,) * n}
+    if signals.reader == "counts":
+        dropped["direction"] = tuple((fast - counts).tolist())
     if not counts.any():
         raise InputError(f"no row is left: {dropped} rows per joint were left out of {K}", file=stream.name)
     return replace(at, rows=tuple(counts.tolist()), shown=tuple(shown.tolist()), dropped=dropped)
 
 
-def _instants(stream: Stream, study: Study, at: Layout) -> Iterator[tuple[Array, Array]]:
-    """Time (k,) and mask (n, k) of the kept instants, by blocks."""
+def _instants(
+    model: GeneratedModel, stream: Stream, study: Study, at: Layout, constants: Mapping[str, float]
+) -> Iterator[tuple[Array, Array, Array]]:
+    """Time (k,) of the kept instants, rows used but for their direction, and rows of known direction, bool (n, k), by blocks."""
     speeds = per_joint(study.rows.low_speed, stream.n, "rows.low_speed")
     k = 0
-    if speeds.any():
-        timed = ((t, qd) for t, _, qd, _, _ in filtered_blocks(stream, study.signals))
+    if speeds.any() or study.signals.reader == "counts":
+        timed = ((t, qd, s) for t, _, qd, _, s, _ in filtered_blocks(model, stream, study.signals))
     else:
-        timed = ((t, np.empty((len(t), stream.n))) for t in stream.times())
-    for begin, (t, qd) in _windowed(timed, at):
+        timed = ((t, np.empty((len(t), stream.n)), np.empty((len(t), 0))) for t in stream.times())
+    for begin, (t, qd, s) in _windowed(timed, at):
         kept = _kept(begin, len(t), at)
         mask = _mask(k, qd[kept], speeds, study.rows.trim, at)
         k += mask.shape[1]
-        yield t[kept], mask
+        states = _states(model, study.signals, qd[kept], qd[kept], qd[kept], s[kept])
+        yield t[kept], mask, certain_rows(model, states, constants)
 
 
 def observed_blocks(
@@ -133,44 +142,64 @@ def observed_blocks(
 
     uniform = list(pairwise([*range(0, N, EVALUATED), N]))
     pieces = uniform if plan is None else plan.pieces(EVALUATED)
-    blocks = (block for _, block in _windowed(filtered_blocks(stream, study.signals), at))
-    for (begin, end), (t, q, qd, qdd, tau) in zip(pieces, recut(blocks, [b - a for a, b in pieces]), strict=True):
+    blocks = (block for _, block in _windowed(filtered_blocks(model, stream, study.signals), at))
+    for (begin, end), (t, q, qd, qdd, s, tau) in zip(pieces, recut(blocks, [b - a for a, b in pieces]), strict=True):
         kept = _kept(begin, end - begin, at)
-        mask = _mask(k, qd[kept], speeds, study.rows.trim, at)
+        states = _states(model, study.signals, q, qd, qdd, s)
+        mask = _mask(k, qd[kept], speeds, study.rows.trim, at) & certain_rows(model, states[kept], constants)
         k += mask.shape[1]
         times.put(t[kept])
         masks.put(mask.T)
-        yield from ready(whole.push(evaluate(States(q, qd, qdd))), torques.push(tau.T))
+        yield from ready(whole.push(evaluate(states)), torques.push(tau.T))
     yield from ready(whole.finish(), torques.finish())
 
 
-def filtered_blocks(stream: Stream, signals: Signals) -> Iterator[tuple[Array, Array, Array, Array, Array]]:
-    """t (B,), q, qd, qdd and torques (B, n) after the median and low-pass filters, by blocks of their own lengths."""
-    if signals.reader != "lowpass":
-        raise SettingsError("counts; a record read by blocks is not read as counts yet, set stream: off", path=("signals", "reader"))
-    position, velocity = position_stage(stream.rate, signals), velocity_stage(stream.rate, signals)
-    acceleration, torque = derivative_stage(stream.rate, signals.ends), Chain(*median_stage(signals.median))
-    queues = [Queue() for _ in range(5)]
+def filtered_blocks(model: GeneratedModel, stream: Stream, signals: Signals) -> Iterator[tuple[Array, Array, Array, Array, Array, Array]]:
+    """t (B,), q, qd, qdd, deviations of the velocities at the encoders and torques (B, n), by blocks of their own lengths.
 
-    def put(t: Array, tau: Array, q: Array, qd: Array, qdd: Array) -> None:
-        for queue, x in zip(queues, (t, q, qd, qdd, tau), strict=True):
+    Positions and torques have passed the median and low-pass filters, or the reader of counts in place of the median; without it there are no
+    deviations, (B, 0).
+    """
+    counts, drives = None, None
+    if signals.reader == "counts":
+        counts, drives = CountStage(len(stream), stream.rate, signals, stream.name), encoder_drives(model, signals)
+    position, velocity = (
+        position_stage(stream.rate, replace(signals, median=1) if counts else signals),
+        velocity_stage(stream.rate, signals),
+    )
+    acceleration, torque = derivative_stage(stream.rate, signals.ends), Chain(*median_stage(signals.median))
+    queues = [Queue() for _ in range(6)]
+
+    def put(t: Array, tau: Array, s: Array, q: Array, qd: Array, qdd: Array) -> None:
+        for queue, x in zip(queues, (t, q, qd, qdd, s, tau), strict=True):
             queue.put(x)
 
-    def known() -> Iterator[tuple[Array, Array, Array, Array, Array]]:
+    def known() -> Iterator[tuple[Array, Array, Array, Array, Array, Array]]:
         count = min(queue.count for queue in queues)
         if count:
-            t, q, qd, qdd, tau = (queue.take(count) for queue in queues)
-            yield t, q, qd, qdd, tau
+            t, q, qd, qdd, s, tau = (queue.take(count) for queue in queues)
+            yield t, q, qd, qdd, s, tau
 
     for t, q, tau in stream.blocks():
+        s = np.empty((len(t), 0))
+        if counts is not None:
+            q, s = counts.push(encoder_position(q, drives))
+            q = q if drives is None or not len(q) else drives.joint_position(q)
         q = position.push(q)
-        qd = velocity.push(q)
-        put(t, torque.push(tau), q, qd, acceleration.push(qd))
+        qd = velocity.push(q) if len(q) else q
+        put(t, torque.push(tau), s, q, qd, acceleration.push(qd) if len(qd) else qd)
         yield from known()
     q = position.finish()
     qd = _pushed_and_finished(velocity, q)
-    put(np.empty(0), torque.finish(), q, qd, _pushed_and_finished(acceleration, qd))
+    put(np.empty(0), torque.finish(), np.empty(0), q, qd, _pushed_and_finished(acceleration, qd))
     yield from known()
+
+
+def _states(model: GeneratedModel, signals: Signals, q: Array, qd: Array, qdd: Array, s: Array) -> States:
+    """States with deviations s, shape (B, encoders), of the velocities; (B, 0): none are known."""
+    if not s.shape[1]:
+        return States(q, qd, qdd)
+    return States(q, qd, qdd, SpeedErrors(s, encoder_root(encoder_drives(model, signals), q.shape[1])))
 
 
 def _window(stream: Stream, t0: float | None, t1: float | None) -> tuple[int, int]:

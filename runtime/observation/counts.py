@@ -9,7 +9,7 @@ Records longer than STRETCH samples are read in stretches that overlap by MARGIN
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -129,17 +129,12 @@ def _reading(counts: Array, rate: float, known: Lattice, lines: float, said: Seq
     states = [np.empty((N, n)) for _ in range(6)]
     density, parts = np.zeros(n), []
     for begin, first, stop, end in stretches(N):
-        k = np.ascontiguousarray(counts[begin:end].T)
-        moving = np.flatnonzero(np.nanmax(k, axis=1) > np.nanmin(k, axis=1))
-        resting = np.setdiff1d(np.arange(n), moving)
-        for value, i in zip((np.nanmean(k[resting], axis=1), 0.0, 0.0, 12**-0.5, 0.0, 0.0), range(6), strict=True):
-            states[i][first:stop, resting] = value
-        if len(moving):
-            part = Part(smoothed(k[moving], 1 / rate, lines=lines), begin, first, stop, moving)
-            for order in range(3):
-                for i, x in zip((order, order + 3), part.smoothed.state(order), strict=True):
-                    states[i][first:stop, moving] = x[:, first - begin : stop - begin].T
-            density[moving] += part.smoothed.density.mean(axis=1) * (stop - first) / N
+        part, read = read_stretch(counts[begin:end], rate, lines)
+        for x, own in zip(states, read, strict=True):
+            x[first:stop] = own[first - begin : stop - begin]
+        if part is not None:
+            part = replace(part, begin=begin, first=first, stop=stop)
+            density[part.moving] += part.smoothed.density.mean(axis=1) * (stop - first) / N
             parts.append(part)
     for i, x in enumerate(states):
         x *= known.step
@@ -148,6 +143,25 @@ def _reading(counts: Array, rate: float, known: Lattice, lines: float, said: Seq
     q, qd, qdd, s_q, s_qd, s_qdd = states
     jerk = np.sqrt(density) * known.step
     return Reading(q, qd, qdd, s_q, s_qd, s_qdd, jerk, known.step, known.phase, (*known.findings, *said), tuple(parts))
+
+
+def read_stretch(counts: Array, rate: float, lines: float) -> tuple[Part | None, list[Array]]:
+    """Posterior of counts, shape (N, n), and q, qd, qdd, s_q, s_qd, s_qdd, shape (N, n) each, in steps; None where nothing moves.
+
+    An encoder whose count never changes rests in the middle of its interval.
+    """
+    N, n = counts.shape
+    k = np.ascontiguousarray(counts.T)
+    moving = np.flatnonzero(np.nanmax(k, axis=1) > np.nanmin(k, axis=1))
+    states = [np.full((N, n), value) for value in (0.0, 0.0, 0.0, 12**-0.5, 0.0, 0.0)]
+    states[0][:] = np.nanmean(k, axis=1)
+    if not len(moving):
+        return None, states
+    part = Part(smoothed(k[moving], 1 / rate, lines=lines), 0, 0, N, moving)
+    for order in range(3):
+        for i, x in zip((order, order + 3), part.smoothed.state(order), strict=True):
+            states[i][:, moving] = x.T
+    return part, states
 
 
 def stretches(N: int) -> list[tuple[int, int, int, int]]:

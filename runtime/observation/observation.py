@@ -184,7 +184,7 @@ def _observed_by_blocks(
 
     A record is read once; twice where rows are left out by speed, since their number is needed first.
     """
-    layouts = [layout(stream, study) for stream in streams]
+    layouts = [layout(model, stream, study, constants) for stream in streams]
     counts = np.array([at.rows for at in layouts])
     names, entries = tuple(model.BASE_PARAMETERS), distinct_entries(model, constants)
     columns = [entries.k[entries.j == j] for j in range(streams[0].n)]

@@ -1,0 +1,58 @@
+"""Counts that come by blocks: the stretches of `runtime.observation.counts`, each read as soon as its samples are there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from runtime.errors import SettingsError
+from runtime.observation.count_smoother import LINES
+from runtime.observation.counts import read_stretch, stretches
+from runtime.observation.encoder_lattice import Lattice, lattice, unwrapped
+from runtime.records.stream import Queue
+from runtime.settings.study import Signals
+
+Array = np.ndarray
+
+
+class CountStage:
+    """Positions at the encoders, shape (B, n), go in by pieces; positions read and deviations of velocities come out.
+
+    Step, phase and findings are those of the first stretch.
+
+    Parameters
+    ----------
+    samples : int
+        N of the record.
+    rate : float, Hz
+    signals : Signals
+    name : str
+        What errors call the record.
+    """
+
+    def __init__(self, samples: int, rate: float, signals: Signals, name: str) -> None:
+        self.rate, self.step, self.name = rate, signals.step, name
+        self.left = stretches(samples)
+        self.held, self.begin = Queue(), 0  # samples from `begin` of the record on
+        self.lattice: Lattice | None = None
+
+    def push(self, position: Array) -> tuple[Array, Array]:
+        """q and s_qd, shape (k, n), of the stretches that are complete."""
+        self.held.put(position)
+        n = position.shape[1]
+        q, s = [np.empty((0, n))], [np.empty((0, n))]
+        while self.left and self.held.count >= self.left[0][3] - self.begin:
+            begin, first, stop, end = self.left.pop(0)
+            x = self.held.take(self.held.count)
+            own = x[: end - begin]
+            self.lattice = self.lattice or lattice(own, self.step, name=self.name)
+            counts, said = unwrapped(self.lattice.counts(own), name=self.name)
+            if said:
+                raise SettingsError(f"{said[0]}; such a record is read as a whole, set stream: off", path=("signals", "reader"))
+            _, states = read_stretch(counts, self.rate, LINES)
+            kept = slice(first - begin, stop - begin)
+            q.append(self.lattice.position(states[0][kept]))
+            s.append(states[4][kept] * self.lattice.step)
+            if self.left:
+                self.held.put(x[self.left[0][0] - begin :])
+                self.begin = self.left[0][0]
+        return np.concatenate(q), np.concatenate(s)
