@@ -26,6 +26,7 @@ from runtime.json_documents import json_text
 from runtime.markup import number
 from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel
+from runtime.observation.encoder_advice import encoder_sentences
 from runtime.observation.observation import Observation
 from runtime.records.provenance import record_names
 from runtime.records.record import UNNAMED, Record
@@ -167,12 +168,14 @@ class Identification:
         names = record_names(self.records)
         return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
 
-    @property
+    @cached_property
     def time_stamps(self) -> tuple[str, ...]:
-        """What the time stamps of the records were like, those of one file once, and the known torques that were subtracted."""
+        """What time stamps and encoders of the records were like, those of one file once, and the known torques that were subtracted."""
         texts = {(record.name.split(" (")[0], text): None for record in self.records if (text := getattr(record, "time", ""))}
         known = [f"{record.name}: {text}." for record in self.records if (text := getattr(record, "known", ""))]
-        return (*(f"Time stamps of {name}: {text}." for name, text in texts), *known)
+        whole = [record for record in self.records if isinstance(record, Record)]
+        encoders = [text for record in whole for text in encoder_sentences(self.model, record, self.study.signals)]
+        return (*(f"Time stamps of {name}: {text}." for name, text in texts), *known, *encoders)
 
     @property
     def prediction_error(self) -> float:

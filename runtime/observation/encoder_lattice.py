@@ -79,6 +79,8 @@ def lattice(
             findings.append(
                 f"{label}: positions lie {off:.2g} steps (rms) off the lattice of step {steps[j]:.6g}, as if rounded to few digits"
             )
+    if step is None:
+        findings.insert(0, f"steps from the record: {', '.join(f'{x:.6g}' for x in steps)}")
     return Lattice(steps, phases, tuple(findings))
 
 
@@ -129,7 +131,7 @@ def _step(x: Array, given: float | None, label: str, name: str) -> tuple[float, 
         own = smallest_step(x)
         if own == 0:
             return 1.0, [f"{label}: the count never changes; the position is taken as at rest"]
-        return own, [f"{label}: step {own:.6g} from the record"]
+        return own, []
     if span == 0:
         return given, [f"{label}: the count never changes; the position is known to {given / np.sqrt(12):.3g} and taken as at rest"]
     if given > 1.5 * span:

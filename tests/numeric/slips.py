@@ -147,7 +147,9 @@ def kr300_values() -> dict[str, float]:
         R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
         P = R @ r + [d, 0, BESIDE.get(j, 0.0)]
         J = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T + m * (P @ P * np.eye(3) - np.outer(P, P))
-        values |= {f"{name}{j}": J[i, k] for name, i, k in (("XX", 0, 0), ("XY", 0, 1), ("XZ", 0, 2), ("YY", 1, 1), ("YZ", 1, 2), ("ZZ", 2, 2))}
+        values |= {
+            f"{name}{j}": J[i, k] for name, i, k in (("XX", 0, 0), ("XY", 0, 1), ("XZ", 0, 2), ("YY", 1, 1), ("YZ", 1, 2), ("ZZ", 2, 2))
+        }
         values |= {f"M{axis}{j}": m * x for axis, x in zip("XYZ", P, strict=True)} | {f"M{j}": m, f"Ia{j}": rotor * ratio**2}
     return {name: float(value) for name, value in values.items()}
 
@@ -177,19 +179,53 @@ def _constants(case: Case, torque_constant: str) -> Case:
 KR300 = (
     Slip(1, "ratio of joint 3 negative", r"torque of joint 3 has the wrong sign|joint 3 counts", lambda c: c.text("757/3", "-757/3")),
     Slip(2, "degrees taken for rad", r"degrees", lambda c: replace(c, q=np.rad2deg(c.q))),
-    Slip(3, "position columns 2 and 3 exchanged", r"position columns of joints 2 and 3", lambda c: replace(c, q=columns(0, 2, 1, 3, 4, 5)(c.q))),
-    Slip(4, "torque columns 4 and 5 exchanged", r"torque columns of joints 4 and 5", lambda c: replace(c, tau=columns(0, 1, 2, 4, 3, 5)(c.tau))),
+    Slip(
+        3,
+        "position columns 2 and 3 exchanged",
+        r"position columns of joints 2 and 3",
+        lambda c: replace(c, q=columns(0, 2, 1, 3, 4, 5)(c.q)),
+    ),
+    Slip(
+        4,
+        "torque columns 4 and 5 exchanged",
+        r"torque columns of joints 4 and 5",
+        lambda c: replace(c, tau=columns(0, 1, 2, 4, 3, 5)(c.tau)),
+    ),
     Slip(5, "joints in reverse order", r"reverse order", lambda c: replace(c, q=c.q[:, ::-1], tau=c.tau[:, ::-1])),
     Slip(6, "gravity with the wrong sign", r"gravity (has|points)|it is \(.*-1.00\)", lambda c: c.text("[0, 0, -g]", "[0, 0, g]")),
     Slip(7, "gravity along y", r"gravity (has|points)|it is \(.*-1.00\)", lambda c: c.text("[0, 0, -g]", "[0, -g, 0]")),
-    Slip(8, "alpha of frame 4 with the wrong sign", r"alpha of frame 4", lambda c: c.text("ant: 3, sigma: 0, alpha: -pi/2", "ant: 3, sigma: 0, alpha: pi/2")),
-    Slip(9, "alpha of frame 2 with the wrong sign", r"alpha of frame 2", lambda c: c.text("ant: 1, sigma: 0, alpha: pi/2", "ant: 1, sigma: 0, alpha: -pi/2")),
+    Slip(
+        8,
+        "alpha of frame 4 with the wrong sign",
+        r"alpha of frame 4",
+        lambda c: c.text("ant: 3, sigma: 0, alpha: -pi/2", "ant: 3, sigma: 0, alpha: pi/2"),
+    ),
+    Slip(
+        9,
+        "alpha of frame 2 with the wrong sign",
+        r"alpha of frame 2",
+        lambda c: c.text("ant: 1, sigma: 0, alpha: pi/2", "ant: 1, sigma: 0, alpha: -pi/2"),
+    ),
     Slip(10, "theta of frame 3 without pi", r"theta of joint 3", lambda c: c.text("q3 + pi", "q3")),
     Slip(11, "time stamps in ms", r"units\.t|record\.rate", lambda c: replace(c, t=1e3 * c.t)),
-    Slip(12, "rate 1000 for 250", r"sampling rate is 1/4", lambda c: replace(c, rate=4.0, study={**c.study, "rows": {"window": [0.45, 2.05], "low_speed": 0.08}, "signals": {"median": 1, "lowpass": {"cutoff": 40}}})),
+    Slip(
+        12,
+        "rate 1000 for 250",
+        r"sampling rate is 1/4",
+        lambda c: replace(
+            c,
+            rate=4.0,
+            study={**c.study, "rows": {"window": [0.45, 2.05], "low_speed": 0.08}, "signals": {"median": 1, "lowpass": {"cutoff": 40}}},
+        ),
+    ),
     Slip(13, "ratio forgotten", r"gear|torque_side", lambda c: replace(c, torque_side="joint")),
     Slip(14, "torque said to be current", r"torque constant", lambda c: _constants(c, "1.2, 1.4, 1.4, 0.6, 0.6, 0.6")),
-    Slip(15, "torque of joint 2 times 1.41", r"torque of joint 2 is to be multiplied|of joint 2 \d", lambda c: replace(c, tau=c.tau * factor(1, 1.41, 6))),
+    Slip(
+        15,
+        "torque of joint 2 times 1.41",
+        r"torque of joint 2 is to be multiplied|of joint 2 \d",
+        lambda c: replace(c, tau=c.tau * factor(1, 1.41, 6)),
+    ),
     Slip(16, "sense of joint 4 turned", r"joint 4 counts", lambda c: replace(c, q=c.q * factor(3, -1, 6), tau=c.tau * factor(3, -1, 6))),
     Slip(17, "secondary encoders: axes 4 to 6 zero", r"4, 5, 6 stand still", lambda c: replace(c, q=c.q * [1, 1, 1, 0, 0, 0])),
     Slip(18, "torque 20 ms late", r"Torques are late", lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 5, axis=0), c.tau[:-5]]))),
@@ -198,21 +234,49 @@ KR300 = (
     Slip(21, "A2 = 1.5 for 1.15", r"d of frame 3 is", lambda c: c.text("A2: 1.15", "A2: 1.5")),
     Slip(23, "D4 in mm", r"r of frame 4|longest link ends at frame 4", lambda c: c.text("D4: 1.0", "D4: 1000.0")),
     Slip(24, "theta of frame 3 wrong by 90 degrees", r"theta of joint 3|zero of joint 3", lambda c: c.text("q3 + pi", "q3 + pi/2")),
-    Slip(25, "ratios of joints 4 and 5 exchanged", r"ratios of joints 4 and 5", lambda c: replace(c, tau=c.tau * [1, 1, 1, 5032 / 21 / 221, 221 / (5032 / 21), 1])),
+    Slip(
+        25,
+        "ratios of joints 4 and 5 exchanged",
+        r"ratios of joints 4 and 5",
+        lambda c: replace(c, tau=c.tau * [1, 1, 1, 5032 / 21 / 221, 221 / (5032 / 21), 1]),
+    ),
     Slip(26, "zero of joint 3 off by 20 degrees", r"zero of joint 3", lambda c: replace(c, q=c.q + np.deg2rad(20) * (np.arange(6) == 2))),
-    Slip(27, "torque of joint 5 in kp m", r"torque of joint 5 is to be multiplied by (8|9|10|11)", lambda c: replace(c, tau=c.tau * factor(4, 1 / 9.81, 6))),
+    Slip(
+        27,
+        "torque of joint 5 in kp m",
+        r"torque of joint 5 is to be multiplied by (8|9|10|11)",
+        lambda c: replace(c, tau=c.tau * factor(4, 1 / 9.81, 6)),
+    ),
     Slip(28, "position columns moved by one", r"position columns are moved by one", lambda c: replace(c, q=np.roll(c.q, 1, axis=1))),
     Slip(29, "torque columns moved by one", r"torque columns are moved by one", lambda c: replace(c, tau=np.roll(c.tau, -1, axis=1))),
     Slip(30, "joint positions taken for those of motors", r"positions of the joints|record\.side", lambda c: replace(c, side="motor")),
     Slip(31, "all torques negative", r"torques have the wrong sign", lambda c: replace(c, tau=-c.tau)),
     Slip(32, "mounted on a wall in the file", r"gravity points|it is \(", lambda c: c.text("[0, 0, -g]", "[g, 0, 0]")),
     Slip(33, "alpha of frame 5 zero", r"alpha of frame 5", lambda c: c.text("ant: 4, sigma: 0, alpha: pi/2", "ant: 4, sigma: 0, alpha: 0")),
-    Slip(34, "torque 12 ms early", r"Torques are early", lambda c: replace(c, tau=np.vstack([c.tau[3:], np.repeat(c.tau[-1:], 3, axis=0)]))),
-    Slip(35, "position of joint 2 with the wrong sign", r"position of joint 2 has the wrong sign|alpha of frame 2|theta of joint 2", lambda c: replace(c, q=c.q * factor(1, -1, 6))),
-    Slip(36, "rate 100 for 250", r"sampling rate is 2.5 times", lambda c: replace(c, rate=0.4, study={**c.study, "rows": {"window": [4.5, 20.5], "low_speed": 0.008}, "signals": {"median": 1, "lowpass": {"cutoff": 4}}})),
+    Slip(
+        34, "torque 12 ms early", r"Torques are early", lambda c: replace(c, tau=np.vstack([c.tau[3:], np.repeat(c.tau[-1:], 3, axis=0)]))
+    ),
+    Slip(
+        35,
+        "position of joint 2 with the wrong sign",
+        r"position of joint 2 has the wrong sign|alpha of frame 2|theta of joint 2",
+        lambda c: replace(c, q=c.q * factor(1, -1, 6)),
+    ),
+    Slip(
+        36,
+        "rate 100 for 250",
+        r"sampling rate is 2.5 times",
+        lambda c: replace(
+            c,
+            rate=0.4,
+            study={**c.study, "rows": {"window": [4.5, 20.5], "low_speed": 0.008}, "signals": {"median": 1, "lowpass": {"cutoff": 4}}},
+        ),
+    ),
     Slip(37, "A3 and D4 exchanged", r"frame 4", lambda c: c.text("A3: 0.041", "A3: 1.0").text("D4: 1.0", "D4: 0.041")),
     Slip(38, "joint 4 in degrees, the others in rad", r"joint 4.*degrees", lambda c: replace(c, q=c.q * factor(3, 180 / np.pi, 6))),
-    Slip(39, "theta of frame 2 with the wrong sign of pi/2", r"theta of joint 2|alpha of frame 2", lambda c: c.text("q2 - pi/2", "q2 + pi/2")),
+    Slip(
+        39, "theta of frame 2 with the wrong sign of pi/2", r"theta of joint 2|alpha of frame 2", lambda c: c.text("q2 - pi/2", "q2 + pi/2")
+    ),
     Slip(40, "another robot's values: masses of a third", r"times that of the values", lambda c: _masses(c, 1 / 3) if c.values else None),
 )  # 22 is equivalent, and so is 40 without values
 
