@@ -225,6 +225,8 @@ class Advice:
         return parts
 
     def _sentence(self, limit: Limit, who: str, unit: str) -> str:
+        if np.isnan(limit.delta) and not limit.parameter:
+            return f"{who}, no step could be judged on this record."
         if np.isnan(limit.delta):
             return f"{who}, {limit.parameter} changes by more than {limit.percent:g} % at the finest step that was tried."
         if not np.isfinite(limit.delta):
@@ -240,7 +242,8 @@ class Advice:
     def to_table(self) -> str:
         """Steps by encoder, then by parameter, then what was assumed."""
         tables = [table.to_text() for table in self.tables()]
-        return "\n\n".join([*tables, *self.asked_lines(), "\n".join(f"- {text}" for text in self.assumptions)])
+        notes = [note for reader in self.real for note in reader.notes]
+        return "\n\n".join([*tables, *self.asked_lines(), "\n".join(f"- {text}" for text in (*self.assumptions, *notes))])
 
     def tables(self) -> list[Table]:
         """Steps by encoder, by the chapter's law and of real encoders by both readers, then by parameter."""

@@ -41,7 +41,7 @@ from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.advice import ALL, LIMITS, Advice, EncoderAdvice, Limit, ReaderAdvice, Sampled, confirmed, crossing, sampled
 from runtime.resolution.perturbed import Task, prepared, study_columns, system_of
-from runtime.resolution.readers import READERS, real_encoders
+from runtime.resolution.readers import LINES, READERS, real_encoders
 from runtime.resolution.result import DECIDING, deciding_names
 from runtime.resolution.rounding import VARIANCE, rounded, stream
 from runtime.settings.study import Study, to_mapping
@@ -191,7 +191,7 @@ def advise(
         asked=tuple(asked),
         steps=np.array([predictor.change(delta, every) for delta in asked]).reshape(len(asked), len(names)),
         torque_sigma=torque_sigma(predictor, drives),
-        assumptions=assumptions(study, records, parts, reference),
+        assumptions=assumptions(study, records, parts, reference, real=bool(by_reader)),
         settings={
             **measured.settings,
             "estimate": to_mapping(study.estimate),
@@ -290,16 +290,17 @@ def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
     return np.asarray(np.sqrt(np.diag(inverse @ middle @ inverse)))
 
 
-def assumptions(study: Study, records: Sequence[Record], parts: Sequence[Perturbation], reference: Estimate) -> tuple[str, ...]:
-    """What the prediction stands on, in words."""
+def assumptions(
+    study: Study, records: Sequence[Record], parts: Sequence[Perturbation], reference: Estimate, *, real: bool = False
+) -> tuple[str, ...]:
+    """What the prediction stands on, in words. real : real encoders were judged too."""
     cestac, low = study.cestac, study.signals.lowpass
     law = {
         "two-point": "+-Delta, variance Delta^2",
         "gaussian": "normal, deviation Delta",
         "uniform": "uniform within +-Delta, variance Delta^2/3",
         "quantise": "to the grid of step Delta below or above, taken as white noise of variance Delta^2/3",
-        "phase": "to the grid of step Delta, to the nearest, of random phase",
-    }[cestac.rounding]
+    }.get(cestac.rounding)
     rates = ", ".join(f"{record.rate:g} Hz" for record in records)
     filters = (
         "no low-pass"
@@ -308,13 +309,22 @@ def assumptions(study: Study, records: Sequence[Record], parts: Sequence[Perturb
     )
     out = [name for name in reference.names if name not in deciding_names(reference)]
     friction = ", ".join(reference.names[s.column] for s in parts[0].switches)
+    lines = f"uneven by {cestac.uneven:g} of a step" if cestac.uneven else "even"
+    place = f"on the {cestac.side} side, sampled at {rates}"
+    encoders = [f"Encoders: rounding {cestac.rounding} ({law}) of every sample, independent from sample to sample, {place}."] if law else []
+    if real:
+        encoders.append(
+            f"Real encoders: counts of steps Delta, lines {lines}, the phase random by encoder and run, {place}. The reader knows the step, not the phase. "
+            f"Curves are a quadrature over the phase, without first order; steps of fewer than {LINES} in the motion of a joint are not judged."
+        )
     return (
-        f"Encoders: rounding {cestac.rounding} ({law}) of every sample, independent from sample to sample, on the {cestac.side} side, sampled at {rates}.",
+        *encoders,
         f"Filters: {filters}, no median, decimation by {', '.join(str(part.selection.factor) for part in parts)}. Another rate or cut-off gives another answer.",
-        f"Method {study.estimate.method}; first order in the variance of the errors, motion slow beside the filters; rows used and weights are those of the record.",
+        f"Method {study.estimate.method}; {'first order in the variance of the errors, motion slow beside the filters; ' if law else ''}rows used and weights are "
+        "those of the record.",
         *(
             [f"Friction that switches with the sign of a speed ({friction}) by its mean and covariance under normal errors."]
-            if friction
+            if friction and law
             else []
         ),
         f"Parameters matter whose %sigma (11) is at most {DECIDING:g} %" + (f"; not: {', '.join(out)}." if out else ", here all of them."),

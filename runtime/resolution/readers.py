@@ -2,7 +2,7 @@
 
     error of encoder i, as read         e_i = reader(phi_i + Delta round((x_i - phi_i)/Delta)) - reader of the record, filtered alike
     states with the encoders S coarse   those of the record + sum over i in S of (R^-1)_i e_i
-    change at Delta                     mean of the least squares of PHASES phases, over that of the record, less 1
+    change at Delta                     mean of the least squares of some phases, over that of the record, less 1
 
 White noise does not describe a sawtooth that is locked to the motion, still less what a reader of counts leaves of it, so no first-order law is used:
 the mean over the random phase is a quadrature. Its nodes are equidistant, shuffled from encoder to encoder, so that the harmonics of the sawtooth cancel
@@ -18,7 +18,6 @@ from typing import Literal
 
 import numpy as np
 
-from runtime.errors import InputError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.methods import linear_system
 from runtime.model.drives import Drives
@@ -40,7 +39,7 @@ Array = np.ndarray
 Reader = Literal["lowpass", "counts"]
 
 READERS: tuple[Reader, ...] = ("lowpass", "counts")
-PHASES = 4  # nodes of the quadrature over the phase
+PHASES: Mapping[Reader, int] = {"lowpass": 8, "counts": 4}  # nodes of the quadrature over the phase
 RATIO = 1.5  # of neighbouring steps
 DOWN, UP = 8, 16  # most steps below and above the first
 LINES = 8  # fewest steps of an encoder in its motion
@@ -100,9 +99,10 @@ class RealEncoders:
 
     def nodes(self, delta: float, moving: Sequence[int]) -> list[list[Errors]]:
         """Errors of every record at the nodes of the quadrature, the encoders `moving` coarse."""
-        shuffled = [stream(self.study.cestac.seed, QUADRATURE + i).permutation(PHASES) for i in range(len(self.model.JOINTS))]
+        count = PHASES[self.reader]
+        shuffled = [stream(self.study.cestac.seed, QUADRATURE + i).permutation(count) for i in range(len(self.model.JOINTS))]
         shift = stream(self.study.cestac.seed, QUADRATURE).random(len(shuffled))
-        at = [np.array([(order[k] + u) / PHASES for order, u in zip(shuffled, shift, strict=True)]) for k in range(PHASES)]
+        at = [np.array([(order[k] + u) / count for order, u in zip(shuffled, shift, strict=True)]) for k in range(count)]
         return [[self._errors(part, delta, delta * phases, moving, stream(self.study.cestac.seed, QUADRATURE, k)) for part in self.parts]
                 for k, phases in enumerate(at)]  # fmt: skip
 
@@ -200,17 +200,20 @@ def _curves(
 ) -> dict[str, tuple[Array, Array]]:
     """Steps and changes by label: from `start` down until all is below the first limit, up until all is above the last."""
     known: dict[str, dict[int, Array]] = {label: {} for label in selections}
-    start = min(start, float(real.coarsest.min()))
     finest = FINER * max((part.record.own.step.max() for part in real.parts if part.record.own is not None), default=0.0)
     coarsest = real.coarsest
+    start = min(max(start, finest), float(coarsest.min()))
 
     def evaluate(k: int) -> dict[str, float]:
         delta = start * RATIO**k
         moving = [i for i, most in enumerate(coarsest) if delta <= most < np.inf]
         asked = {label: own for label, own in selections.items() if set(own) <= {*moving, *np.flatnonzero(np.isinf(coarsest))}}
-        if not asked or delta < finest or not moving:
+        if not asked or delta < finest * (1 - 1e-9) or not moving:
             return {}
-        nodes = real.nodes(delta, moving)
+        try:
+            nodes = real.nodes(delta, moving)
+        except np.linalg.LinAlgError:  # steps that this reader does not resolve
+            return {}
         for label, own in asked.items():
             known[label][k] = real.change(nodes, own)
         return {label: float(np.abs(known[label][k][decisive]).max(initial=0.0)) for label in asked}
@@ -220,8 +223,6 @@ def _curves(
             worst = evaluate(step * k)
             if not worst or (max(worst.values()) < limit if step < 0 else min(worst.values()) > limit):
                 break
-    if not any(known.values()):
-        raise InputError(f"no step between {finest:.3g} and {np.min(coarsest):.3g} can be judged on these records; record a larger motion")
     order = {label: sorted(own) for label, own in known.items()}
     b = len(real.names)
     return {
@@ -231,12 +232,14 @@ def _curves(
 
 
 def _advice(label: str, delta: Array, change: Array, reference: Estimate, unit: str) -> EncoderAdvice:
-    """Limits where the first parameter that matters crosses them; nan where the finest step is already beyond, inf where no step is."""
+    """Limits where the first parameter that matters crosses them; nan where the finest step is already beyond or none is judged, inf where no step is."""
     names = deciding_names(reference)
+    if not len(delta):
+        return EncoderAdvice(label, tuple(Limit(percent, np.nan, "") for percent in LIMITS), delta, change, unit=unit)
     limits = []
     for percent in LIMITS:
         first = {name: crossing(delta, np.abs(change[:, reference.names.index(name)]), percent) for name in names}
-        beyond = [name for name in names if len(change) and abs(change[0, reference.names.index(name)]) > percent]
+        beyond = [name for name in names if abs(change[0, reference.names.index(name)]) > percent]
         reached = {name: step for name, step in first.items() if np.isfinite(step)}
         if beyond:
             worst = max(beyond, key=lambda name: abs(change[0, reference.names.index(name)]))

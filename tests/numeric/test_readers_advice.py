@@ -1,0 +1,66 @@
+"""Advice on real encoders, read as positions and as counts, on a simulated record of the planar arm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_cestac_counts import RECORD, SIGNALS, STEP, planar
+
+from runtime.reporting.resolution_advice import advice_section
+from runtime.resolution.advisor import advise
+from runtime.resolution.cestac import cestac
+from runtime.resolution.readers import RealEncoders
+from runtime.settings.study import CestacSettings, Rows, Study
+
+NAMES = ("ZZ1R", "ZZ2", "FV1")
+STUDY = Study(
+    signals=replace(SIGNALS, reader="lowpass"),
+    rows=Rows(trim=20),
+    cestac=CestacSettings(columns=NAMES, runs=3, rounding="phase", delta=(STEP,)),
+)
+
+
+@pytest.fixture(scope="module")
+def advice():
+    return advise(planar, RECORD, STUDY, encoders=("all", "2"))
+
+
+def test_quadrature_over_the_phase_is_the_mean_of_cestac():
+    """Against 60 runs of CESTAC, three deviations of their mean, 20 % (10 % of Delta) and 0.3; for one encoder of two alike."""
+    found = cestac(planar, RECORD, replace(STUDY, cestac=replace(STUDY.cestac, runs=60)))
+    real = RealEncoders(planar, [RECORD], STUDY, NAMES, None, {}, "lowpass")
+    nodes = real.nodes(STEP, (0, 1))
+    level = found.levels[0]
+    sampled = 100 * (level.mean / found.reference.X - 1)
+    assert np.allclose(real.reference, found.reference.X, rtol=1e-9)
+    assert np.all(np.abs(real.change(nodes, (0, 1)) - sampled) < 3 * level.half_width_percent / 2 + 0.2 * np.abs(sampled) + 0.3)
+    alone = real.sampled(found.reference, (1,), STEP, 40)
+    assert np.all(np.abs(real.change(nodes, (1,)) - alone.change) < 3 * alone.half_width / 2 + 0.2 * np.abs(alone.change) + 0.3)
+
+
+def test_steps_by_both_readers(advice):
+    positions, counts = advice.real
+    assert (positions.reader, counts.reader) == ("lowpass", "counts") and advice.encoders is positions.encoders
+    assert [encoder.label for encoder in counts.encoders] == ["all", "2"]
+    coarse = [reader.encoders[0].limits[1].delta for reader in advice.real]
+    assert coarse[1] > 3 * coarse[0]
+    for limit in positions.encoders[0].limits:
+        assert limit.sampled is not None and abs(limit.error / limit.percent - 1) < 0.4 + limit.half_width / limit.percent
+    assert advice.real[0].encoders[0].limits[0].delta <= min(encoder.limits[0].delta for encoder in positions.encoders[1:]) * 1.05
+
+
+def test_side_by_side_in_words(advice):
+    text = str(advice)
+    assert "positions, 1 %" in text and "counts, 5 %" in text and "quadrature over the phase" in text
+    assert "Real encoders read as counts: With every encoder alike" in advice.verdict
+    assert set(advice_section(advice).tables[0].header) >= {"encoder", "positions, 5 %", "counts, 1 %"}
+    assert '"real"' in advice.to_json()
+
+
+def test_a_record_that_is_coarse_itself_sets_the_finest_step():
+    d = 1e-3
+    part = replace(RECORD, t=RECORD.t[:2500], q=RECORD.q[:2500], tau=RECORD.tau[:2500])
+    coarse = replace(part, q=d * np.round(part.q / d))
+    found = advise(planar, coarse, replace(STUDY, rows=Rows(trim=5)), encoders=("2",), confirm=False)
+    steps = [delta for reader in found.real for delta in reader.encoders[0].delta]
+    assert steps and min(steps) >= 5 * d * (1 - 1e-9)
