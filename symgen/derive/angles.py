@@ -13,8 +13,6 @@ from fractions import Fraction
 from functools import lru_cache
 from math import gcd, lcm
 
-import numpy as np
-
 from symgen.description.expression import Call, Expression, Monomial, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Robot
 
@@ -172,29 +170,19 @@ def radicands(robot: Robot) -> tuple[int, ...]:
     return tuple(sorted({int(c) for c in arguments if c is not None}))
 
 
+def nested_roots(robot: Robot) -> bool:
+    """Whether there are square roots of numbers that hold square roots themselves."""
+    return any(
+        a.function == "sqrt" and not a.argument.symbols and any(isinstance(b, Call) for b in a.argument.atoms) for a in _calls(robot)
+    )
+
+
 def roots_of(robot: Robot) -> tuple[Call, ...]:
     """The square roots in lengths, gravity, ratios and rows of elements."""
     return tuple(dict.fromkeys(a for a in _calls(robot) if a.function == "sqrt"))
 
 
-@lru_cache
-def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
-    """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, in which the radicands are squares: the largest, or below a random place."""
-    step = lcm(4, 2 * units_of(robot).D)
-    top = 2**31 if seed is None else int(np.random.default_rng(seed).integers(2**30, 2**31))
-    squares = [c for c in radicands(robot) if c >= LARGEST_RADICAND]
-    p = top // step * step - 1
-    found: list[int] = []
-    while len(found) < count:
-        if p < 2**20:
-            raise ArithmeticError(f"no prime below 2**31 for angles pi/{step // 2} and the square roots of {squares}")
-        if _is_prime(p) and all(pow(c, (p - 1) // 2, p) == 1 for c in squares):
-            found.append(p)
-        p -= step
-    return tuple(found)
-
-
-def _is_prime(n: int) -> bool:
+def is_prime(n: int) -> bool:
     """Miller-Rabin with bases 2, 3, 5, 7: exact below 3.2e9."""
     if n < 2 or any(n % b == 0 for b in (2, 3, 5, 7) if n != b):
         return False

@@ -22,15 +22,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+from functools import lru_cache
+from math import lcm
 
 import numpy as np
 
-from symgen.derive.angles import LARGEST_RADICAND, PI, Unit, Variable, primes_for, units_of
+from symgen.derive.angles import LARGEST_RADICAND, PI, Unit, Variable, is_prime, nested_roots, radicands, units_of
 from symgen.derive.scalar import Scalar, Turn, Unnamed
 from symgen.description.expression import Call, Expression, Number, call, quarter_turns
 from symgen.description.robot import Robot
+from symgen.errors import SymgenError
 
 Array = np.ndarray
+FEW, MOST_PRIMES = 12, 300  # draws over a prime, and primes looked at, for nested square roots of numbers
 
 
 class Fp:
@@ -84,7 +88,7 @@ class Draw(Unnamed):
     """One random robot and `samples` random states over F_p: an Algebra of the derivation.
 
     `geometry` gives residues, shape (count, 1), for constants by name and for half-angle tangents of fixed angles by their unit: `count`
-    robots in the same states. Without it everything is random and redrawn until every square root exists.
+    robots in the same states. Without it everything is random and redrawn until every square root exists, `attempts` times at most.
     """
 
     def __init__(
@@ -96,6 +100,7 @@ class Draw(Unnamed):
         p: int | None = None,
         geometry: Mapping[Variable, Array] | None = None,
         count: int = 0,
+        attempts: int = 200,
     ) -> None:
         self.robot, self.samples = robot, samples
         self.shape = (count, samples) if geometry is not None else (samples,)
@@ -103,12 +108,14 @@ class Draw(Unnamed):
         self.units = units_of(robot)
         self.p = p if p is not None else primes_for(robot, 1)[0]
         self.rng = np.random.default_rng(seed)
-        for _ in range(200):
+        self.complete = False
+        for _ in range(attempts):
             names = (*robot.constants, "pi")
             self._constants = {name: self._geometry[name] if name in self._geometry else self._random(1) for name in names}
             self._angles: dict[Unit, Point] = {}
             self._root: Point | None = None
-            if self._roots_exist():
+            self.complete = self._roots_exist()
+            if self.complete:
                 break
         self._rate: dict[tuple[int, int], Array] = {}
         self._directions: dict[tuple[tuple[int, tuple[int, ...]], ...], Array] = {}
@@ -280,3 +287,27 @@ class Draw(Unnamed):
         if orientation < 0:
             b = 1 - b
         return (b, b * rate) if when == "positive" else (b - 1, (1 - b) * rate)
+
+
+@lru_cache
+def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
+    """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, over which the square roots of the robot exist: the largest, or below a random place.
+
+    Raises SymgenError where so many of them nest that none of MOST_PRIMES has all.
+    """
+    step = lcm(4, 2 * units_of(robot).D)
+    top = 2**31 if seed is None else int(np.random.default_rng(seed).integers(2**30, 2**31))
+    squares, nested = [c for c in radicands(robot) if c >= LARGEST_RADICAND], nested_roots(robot)
+    p, tried = top // step * step - 1, 0
+    found: list[int] = []
+    while len(found) < count:
+        if p < 2**20 or tried == MOST_PRIMES:
+            raise SymgenError(
+                f"robot {robot.name}: no prime found over which angles pi/{step // 2} and all its square roots exist; write some of them as decimals"
+            )
+        if is_prime(p) and all(pow(c, (p - 1) // 2, p) == 1 for c in squares):
+            tried += 1
+            if not nested or Draw(robot, 5, 1, p=p, attempts=FEW).complete:
+                found.append(p)
+        p -= step
+    return tuple(found)

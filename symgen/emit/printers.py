@@ -232,4 +232,4 @@ class Text:
 
 def number(c: Fraction) -> str:
     """A constant as Python reads it back."""
-    return str(c.numerator) if c.denominator == 1 else repr(float(c))
+    return str(c.numerator) if c.denominator == 1 and abs(c) < 2**53 else repr(float(c))

@@ -28,8 +28,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symgen.derive.angles import primes_for, units_of
-from symgen.derive.exact import Array, Draw, Fp
+from symgen.derive.angles import units_of
+from symgen.derive.exact import Array, Draw, Fp, primes_for
 from symgen.derive.loops import close
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot
@@ -48,6 +48,7 @@ ZERO_BELOW = 1e-9  # rad, m or a cosine: a denominator that is zero but for roun
 AT_VALUES = "say --at-values for the regrouping that does"
 SURE, MOST_DRAWS = 1e-12, 8  # largest probability that a false identity passes, and draws over F_p at most
 FEW_STATES = 3  # of each draw for the identities: one would do
+FAR_APART = 1e6  # lengths of one robot: squares of their ratio come near rounding
 SEEN = 1e3  # gap of singular values that rounding does not make
 CLEAR = 1e9  # gap of singular values at the rank of a geometry that is special; less where it is a hair off one
 TOLERANCE = 1e-9  # relative to the largest entry: rounding of some thousand operations and of the closed loops
@@ -204,6 +205,11 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
             if gap > CLEAR
             else f"the file is a hair off a special geometry: {len(regrouping) - rank} of its base parameters act by less than 1e-9 of the others, "
             "which no record can tell; round the numbers that are meant round, angles and axes first"
+        )
+    sizes = sorted(x for f in robot.frames for e in (f.b, f.d, f.r0) if (x := abs(e.value(robot.constants))))
+    if rank > exact_rank == len(regrouping) and sizes[-1] > FAR_APART * sizes[0]:
+        special.append(
+            f"lengths between {sizes[0]:.3g} and {sizes[-1]:.3g} m lie too far apart for checks in double precision; give them in one order of size"
         )
     failures += special
     chi = np.random.default_rng(6).standard_normal(len(robot.parameters))

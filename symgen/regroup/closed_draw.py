@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from symgen.derive.angles import Variable, primes_for
+from symgen.derive.angles import Variable
 from symgen.derive.columns import columns
-from symgen.derive.exact import Array, Draw, Fp, Point, power
+from symgen.derive.exact import Array, Draw, Fp, Point, power, primes_for
 from symgen.derive.geometry import Geometry
 from symgen.derive.loop_equations import loop_system, residuals
 from symgen.derive.newton_euler import Motion

@@ -21,9 +21,9 @@ from typing import Protocol
 
 import numpy as np
 
-from symgen.derive.angles import PI, Variable, fixed_angles, primes_for, roots_of, units_of
+from symgen.derive.angles import PI, Variable, fixed_angles, roots_of, units_of
 from symgen.derive.columns import columns
-from symgen.derive.exact import Array, Draw, Fp
+from symgen.derive.exact import Array, Draw, Fp, primes_for
 from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
 from symgen.derive.loops import close

@@ -99,6 +99,7 @@ ROBOTS = {
         "0 0 q1 0", "pi/2 sqrt(a**2+b**2) q2 0", "0 a q3 b", "pi/3 sqrt(a**2+b**2) q4 0", constants="g: 9.81, a: 0.3, b: 0.4"
     ),
     "nested roots": arm("0 0 q1 0", "pi/8 sqrt(2+sqrt(2))/2 q2 0", "pi/8 sqrt(2+sqrt(2))/2 q3 0", "pi/4 0.1 q4 0"),
+    "nested roots that few primes have": arm("0 0 q1 0", "pi/2 sqrt(123456789123456789123)*1e-11 q2 sqrt(2+sqrt(3+sqrt(5)))", "0 0.3 q3 0"),
     "twenty-nine digits": arm("0 0 q1 0", "0 0.12345678901234567890123456789 q2 0", "0 0.98765432109876543210987654321 q3 0"),
     "frames without mass between links, at decimal angles": arm(
         "0 0 q1 0",
@@ -173,6 +174,11 @@ def test_values_at_which_a_formula_divides_by_zero_are_told() -> None:
         certified_files(special)
     found = regrouping(at_values(special))
     assert certify(found).valid and not found.robot.constants
+
+
+def test_lengths_too_far_apart_are_told() -> None:
+    certificate = certify(regrouping(arm("0 0 q1 0", "pi/2 0.3 q2 1e-9", "0 1e6 q3 0")))
+    assert not certificate.valid and "lengths between 1e-09 and 1e+06 m lie too far apart" in certificate.failures[-1]
 
 
 def test_constants_become_their_decimals() -> None:
