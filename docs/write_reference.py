@@ -15,6 +15,7 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent), str(DOCS / "_ext")]
 
 import api  # noqa: E402
+import notebooks  # noqa: E402
 import reference  # noqa: E402
 
 MARK = re.compile(r"^<!-- generated: (?P<name>\w+)(?: (?P<argument>[\w.]+))? -->\n.*?^<!-- end -->$", re.MULTILINE | re.DOTALL)
@@ -23,6 +24,7 @@ SOURCES: dict[str, Callable[..., str]] = {
     "contents": api.contents,
     "examples": reference.examples,
     "names": api.names,
+    "notebook": notebooks.notebook,
     "robot_file": reference.robot_file,
     "robots": reference.robots,
     "study_file": reference.study_file,

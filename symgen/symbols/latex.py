@@ -89,10 +89,10 @@ class LatexText(Text):
         return super()._body(s)
 
 
-def aligned(equations: Iterable[str]) -> str:
-    """An `align*` environment of equations `left &= right`, long ones broken."""
+def aligned(equations: Iterable[str], environment: str = "align*") -> str:
+    """An environment of equations `left &= right`, long ones broken."""
     rows = [" \\\\\n".join(broken(line)) for line in equations]
-    return "\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}"
+    return f"\\begin{{{environment}}}\n" + " \\\\\n".join(rows) + f"\n\\end{{{environment}}}"
 
 
 def broken(line: str) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, TypeVar
 
@@ -33,6 +34,21 @@ def printed(model: SymbolicModel, form: str, language: str) -> str:
     if language == "sympy":
         return sympy_lines(model, form)
     return {"text": text, "latex": latex_document, "latex-fragment": latex_fragment}[language](model, form)
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """A model as formulas: text where it is printed, typeset in a notebook."""
+
+    model: SymbolicModel
+    form: str
+
+    def __str__(self) -> str:
+        return text(self.model, self.form)
+
+    def _repr_latex_(self) -> str:
+        lines = latex_lines(self.model, self.form)
+        return f"$${latex.aligned([line for title, found in lines if title != 'Angles' for line in found], 'aligned')}$$"
 
 
 # --- closed forms in any language ---

@@ -13,7 +13,7 @@ from symgen.description.robot import Robot
 from symgen.errors import SymgenError
 from symgen.symbols.derivation import Source, source_of
 from symgen.symbols.models import MODELS, Request
-from symgen.symbols.printing import printed
+from symgen.symbols.printing import Formulas, printed
 from symgen.symbols.symbolic_model import LARGEST, SymbolicModel
 
 
@@ -105,6 +105,12 @@ class SymbolicRobot:
         form : closed or recursive. format : text, latex (a document that compiles), latex-fragment (its formulas alone), sympy (Python), json.
         """
         return printed(self.model(name, of=of, frame=frame, rows=rows), form, format)
+
+    def formulas(
+        self, name: str, *, form: str = "closed", of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None
+    ) -> Formulas:
+        """A model as formulas: typeset in a notebook, text where it is printed."""
+        return Formulas(self.model(name, of=of, frame=frame, rows=rows), form)
 
     # --- symbols ---
 
