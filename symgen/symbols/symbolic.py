@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from symgen.derive.names import Names
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
@@ -116,12 +117,13 @@ class SymbolicRobot:
 
     @cached_property
     def symbols(self) -> dict[str, Any]:
-        """Every symbol by name: constants, positions, velocities, accelerations, torques, parameters."""
+        """Every symbol by name: constants, positions, velocities, accelerations, torques, rates G of tied joints, parameters."""
         from symgen.symbols.sympy_objects import symbol
 
         robot = self.source.robot
         joints = [f"{state}{j}" for state in ("q", "QP", "QDP", "GAM") for j in robot.moving]
-        return {name: symbol(name) for name in (*robot.constants, *joints, *self.source.parameters)}
+        rates = [Names(len(robot.frames))("G", u, i) for u in self.source.relations.tied for i in robot.joints]
+        return {name: symbol(name) for name in (*robot.constants, *joints, *rates, *self.source.parameters)}
 
     @property
     def q(self) -> tuple[Any, ...]:
