@@ -91,7 +91,7 @@ def test_agrees_under_numpy_and_under_the_strict_standard(name):
     agree(name, package("array_api_strict"))
 
 
-@pytest.mark.parametrize("name", sampled(["tx40", "haptic", "sr400", "emps_asymmetric"], 0, always=("haptic", "emps_asymmetric")))
+@pytest.mark.parametrize("name", sampled(["tx40", "haptic", "sr400", "emps_asymmetric"], 0, always=("emps_asymmetric",)))
 def test_agrees_under_jax(name):
     agree(name, package("jax"))
 

@@ -72,14 +72,11 @@ def test_statistics_are_equations_18_to_22(small):
 
 
 def test_processes_give_the_same_bits(small):
+    """Of this one, too: BLAS has one thread in all of them (conftest.py)."""
     calls = []
-    one, two = (
-        cestac(planar, RECORD, study(), workers=workers, progress=lambda done, total: calls.append((done, total))) for workers in (1, 2)
-    )
-    assert one.to_json() == two.to_json()
-    assert calls == [(done, 6) for done in range(1, 7)] * 2
-    for here, there in zip(small.levels, one.levels, strict=True):  # here BLAS may use several threads and change the last bits
-        assert np.allclose(here.mean, there.mean, rtol=1e-12)
+    two = cestac(planar, RECORD, study(), workers=2, progress=lambda done, total: calls.append((done, total)))
+    assert two.to_json() == small.to_json()
+    assert calls == [(done, 6) for done in range(1, 7)]
 
 
 def test_common_random_numbers_are_filtered_once_for_all_steps():

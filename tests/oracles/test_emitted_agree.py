@@ -6,6 +6,7 @@ Tolerance 1e-10 of the largest entry, for regressors of every (joint, column). S
 from __future__ import annotations
 
 import importlib.util
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -25,9 +26,12 @@ PACKAGED = [robot for robot in map(load_robot, packaged_robots()) if not robot.p
 ROBOTS = [*PACKAGED, *sampled([random_robot(seed) for seed in SEEDS], 25)]
 
 
+text_of = cache(generate_module)
+
+
 def emitted(robot: Robot, folder: Path) -> ModuleType:
     path = folder / f"{robot.name}.py"
-    path.write_text(generate_module(robot), encoding="utf-8")
+    path.write_text(text_of(robot), encoding="utf-8")
     spec = importlib.util.spec_from_file_location(robot.name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
