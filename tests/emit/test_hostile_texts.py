@@ -190,10 +190,10 @@ def check(given, expected, folder):
 FIELDS = ("title", "source", "file")
 
 
-@pytest.mark.parametrize("every", [3, pytest.param(1, marks=campaign)])
+@pytest.mark.parametrize("every", [6, pytest.param(1, marks=campaign)])
 @pytest.mark.parametrize("field", FIELDS)
 def test_texts_stay_texts(field, every, plain, expected, tmp_path):
-    """Every text in every field; by default what is not refused is read back in one of the three fields, not the same for each text."""
+    """Every text in every field; by default every second of those that are not refused is read back, in one of the three fields."""
     refused = []
     for k, text in enumerate(NASTY):
         try:
@@ -240,7 +240,7 @@ def test_any_text(text):
     assert "??/" not in files["arm.c"]
 
 
-@pytest.mark.parametrize("every", [4, pytest.param(1, marks=campaign)])
+@pytest.mark.parametrize("every", [8, pytest.param(1, marks=campaign)])
 @pytest.mark.parametrize("field", ["constant", "family", "name"])
 def test_names_are_identifiers_that_hide_nothing(field, every, expected, tmp_path):
     """A name is refused, or every model with it says the same as with another name, runs and passes the loader."""

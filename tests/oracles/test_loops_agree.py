@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from campaign import sampled
 
 from oracles.multipliers import Multipliers
 from oracles.random_parallelograms import SEEDS, random_parallelogram
@@ -109,7 +110,7 @@ def regular_states(module: ModuleType, robot: Robot, model: Lagrange, samples: i
     return (q[keep], qd, qdd), Multipliers(robot, beside, qd, qdd, model)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", sampled(NAMES, 10, always=PACKAGED))
 def test_module_against_multipliers(name: str, emitted: Emitted) -> None:
     robot, module = robot_of(name), emitted(name)
     model = Lagrange(robot)
@@ -141,7 +142,7 @@ def test_module_against_multipliers(name: str, emitted: Emitted) -> None:
     assert not D[:, ~np.array(module.STRUCTURE).T].any()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", sampled(NAMES, 10, always=PACKAGED))
 def test_certificate(name: str) -> None:
     certificate = certify_formulas(regrouped(name))
     assert certificate.valid, certificate.failures
