@@ -91,7 +91,7 @@ def test_moments_are_those_of_the_filters_as_they_run(signals, rate):
     assert np.isclose(band.speed[lag], x[1, lag:] @ x[1, :-lag] / (x[1] @ x[1]), atol=1e-6)
 
 
-@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize("half", [pytest.param(False, marks=pytest.mark.campaign), True])
 def test_a_switch_under_noise_against_sampling(half):
     """sign(s) and max(s, 0) of a speed that rests, creeps and passes zero, 400 draws of filtered noise."""
     signals, rate, N = Signals(median=1, lowpass=Lowpass(cutoff=50)), 2000.0, 16000
