@@ -13,8 +13,6 @@ from runtime import result_files
 from symgen.cli.main import app
 from symgen.description.files import read_robot
 
-pytest.importorskip("mujoco")
-
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 import typer
+from campaign import campaign
 from typer.testing import CliRunner
 
 from symgen.cli.demo import demo
@@ -26,6 +27,7 @@ def quick(tmp_path_factory):
     return CliRunner().invoke(app, ["haptic", "-o", str(out), "--quick"]), out
 
 
+@campaign
 def test_labelled_as_simulated_everywhere(quick):
     result, out = quick
     assert result.exit_code == 0, result.output
@@ -40,6 +42,7 @@ def test_labelled_as_simulated_everywhere(quick):
     assert "http://" not in html and "https://" not in html and html.count("<script") == 2
 
 
+@campaign
 def test_report_has_its_tables_and_figures(quick):
     _, out = quick
     html = (out / "report.html").read_text(encoding="utf-8")
@@ -55,6 +58,7 @@ def test_report_has_its_tables_and_figures(quick):
     assert (out / "handle.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@campaign
 def test_table_6_comes_back(quick):
     """All fourteen, no other, within 3.5 standard deviations (10) of what was put in: fourteen draws, sigma of equal noise on all joints."""
     _, out = quick
@@ -64,6 +68,7 @@ def test_table_6_comes_back(quick):
         assert abs(x - float(haptic_tables.TABLE_6[name])) < 3.5 * sigma, name
 
 
+@campaign
 def test_table_7_has_the_order_of_the_chapter(quick):
     """%e below 1 % at the real step; small variations, then biased, among main inertia and gravity parameters; dry friction stays."""
     result, out = quick

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import campaign
 from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
@@ -58,6 +59,7 @@ def test_motion_from_a_record(study: Path, tmp_path: Path) -> None:
     assert "FV1" in page and "<script" not in page
 
 
+@campaign
 def test_the_trajectory_is_a_reference(study: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run("excite", "emps", study, "-o", out, "--starts", 1, "--criterion", "sigma").exit_code == 0

@@ -179,7 +179,7 @@ def whole(tx40_data):
     return run("tx40", "tx40", "--json").stdout
 
 
-@pytest.mark.parametrize("held", [100e6, 0], ids=["rows held", "rows reduced"])
+@pytest.mark.parametrize("held", [pytest.param(100e6, marks=campaign), 0], ids=["rows held", "rows reduced"])
 def test_blocks_give_the_same_result(whole, monkeypatch, held):
     """Every figure of estimate.json but the settings, to 1e-9 of the largest of its kind."""
     monkeypatch.setattr("runtime.observation.observation.HELD", held)

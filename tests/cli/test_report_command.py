@@ -28,6 +28,7 @@ def record(tmp_path):
     return tmp_path / "record.csv"
 
 
+@campaign
 def test_measured_record_of_one_joint(emps_data, tmp_path):
     result = run("emps", "emps", "-o", tmp_path / "out", "--encoder", "1e-6")
     assert result.exit_code == 0, result.output

@@ -1,4 +1,4 @@
-"""README and docs: the default run checks what every block names and runs the examples and the README; the campaign runs every block of every page.
+"""README and docs: the default run checks what every block names and runs most examples and the README; the campaign runs every block of every page.
 
 A page becomes one script in an empty folder: its Python blocks share a namespace, its commands run with `symgen` on PATH, a YAML block whose first
 line is `# NAME.yaml` is written to that file. `# exit code 1` at the end of a block of commands says what its last command ends with. ```text is not run.
@@ -34,6 +34,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
 FENCE = re.compile(r"^```(?P<kind>python|sh|yaml)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 SOON = ("README",)  # pages that the default run runs
+LONG = ("04_closed_loop", "06_exciting_motion")  # examples that a campaign runs
 BY_CI = "python3 -m venv"  # blocks that .ci/run takes from the README and runs itself
 RUN = """
 def sh(text, code):
@@ -111,7 +112,7 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path, request: pytest.Fixtur
     run([sys.executable, str(tmp_path / "page.py")], tmp_path / "page")
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
+@pytest.mark.parametrize("example", [pytest.param(p, marks=campaign) if p.stem in LONG else p for p in EXAMPLES], ids=lambda p: p.stem)
 def test_examples_run(example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """In this process: what an example imports is there already."""
     assert example.read_text(encoding="utf-8").count("\n") < 50

@@ -93,7 +93,8 @@ def test_agrees_with_numpy(name: str, tmp_path: Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", sampled(ROBOTS, 0, always=("haptic",)))
+@campaign
+@pytest.mark.parametrize("name", ROBOTS)
 def test_agrees_as_users_compile_it(name: str, tmp_path: Path) -> None:
     library = ctypes.CDLL(str(compiled(tmp_path, files(name)[f"{name}.c"], COMPILERS[0], FAST)))
     compare(library, numpy_module(name, files(name)[f"{name}.py"]), (0, 1, 513, 1024))

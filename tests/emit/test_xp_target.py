@@ -137,6 +137,7 @@ def test_constants_are_keywords():
     assert deviation(model.regressor(q, qd, qdd, **changed), reference.regressor(q, qd, qdd, **changed)) <= TOLERANCE
 
 
+@pytest.mark.campaign
 def test_jax_compiles_maps_and_differentiates():
     jnp = package("jax")
     import jax

@@ -6,6 +6,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from campaign import campaign
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.methods import estimate_of
@@ -74,7 +75,7 @@ def test_smooth_sign_is_tanh_and_nothing_else_changes(planar: tuple) -> None:
     assert ca.OP_SIGN not in [smooth.instruction_id(k) for k in range(smooth.n_instructions())]
 
 
-@pytest.mark.parametrize("criterion", ["cond", "sigma", "logdet"])
+@pytest.mark.parametrize("criterion", [pytest.param("cond", marks=campaign), "sigma", "logdet"])
 def test_motion_within_limits_and_better_than_the_start(planar: tuple, criterion: str) -> None:
     model, path, X = planar
     asked = settings(criterion=criterion, begin=[0.1, -0.2])
@@ -126,6 +127,7 @@ def _power_kept() -> float:
     return float(np.var(decimate(noise, 10, zero_phase=True)[50:-50]))
 
 
+@campaign
 def test_torque_limits_hold(planar: tuple, free: object) -> None:
     model, _, X = planar
     largest = np.abs(model.inverse_dynamics(*free.motion.sampled(1000.0)[1:], X)).max(axis=0)
@@ -195,6 +197,7 @@ def test_what_cannot_be_is_said(planar: tuple) -> None:
     assert Sphere(1, 0.2).centre == (0.0, 0.0, 0.0)
 
 
+@campaign
 def test_a_wider_margin_starts_from_the_motion_found(planar: tuple) -> None:
     model, path, X = planar
     asked = settings()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import campaign
 
 from runtime import InputError, Record, observe
 from runtime.estimators.methods import estimate_of
@@ -123,6 +124,7 @@ def test_emps_has_the_published_asymmetric_friction(emps_data) -> None:
         assert curve.law.parameters[name] == pytest.approx(value, rel=5e-4)
 
 
+@campaign
 def test_tx40_record(tx40_data) -> None:
     """Held out, joint 3 goes from 12.7 to 8.4 % with load and a bend towards standstill; no joint has a Stribeck peak."""
     tx40 = emitted("tx40")

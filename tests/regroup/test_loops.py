@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from campaign import campaign
 
 from oracles.same_draw import same_draw
 from symgen.derive import loops
@@ -211,7 +212,7 @@ def test_five_bar() -> None:
 # --- certificates ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["haptic", "sr400"])
+@pytest.mark.parametrize("name", ["haptic", pytest.param("sr400", marks=campaign)])
 def test_certified_and_every_perturbed_coefficient_caught(name: str) -> None:
     regrouping, once = regrouped(name), same_draw()
     assert certify_formulas(regrouping, sampler=once).valid
