@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"  # before numpy
@@ -47,6 +47,7 @@ MAIN = [
 ]
 STEPS = (5000, 2000, 1000, 500, 250, 100)  # counts per turn of the joint
 RATES = (5000, 1000, 500, 250)
+LINE_MODES: Mapping[str, Literal["detected", "estimated"]] = {"counts": "detected", "estimated": "estimated"}
 PROTOTYPE = {5000: 1.4, 2000: 1.7, 1000: 3.3, 500: 4.7, 250: 7.3, 100: 9.3}  # rms %, mean of three phases, of the design note
 LINES = {"quadrature 0.1": (0.1, "quadrature"), "random 0.1": (0.1, "random"), "random 0.03": (0.03, "random")}
 
@@ -85,7 +86,8 @@ def quantised(q: Array, step: float, seed: int, lines: str = "") -> Array:
 def estimated(record: Record, q: Array, step: float, reader: str) -> dict[str, Any]:
     """Main parameters and their stated deviations of the record with other positions; for counts, those of the record itself on the same rows too."""
     model, study, _, names, _ = measured()
-    signals = replace(study.signals, reader=reader, step=step if reader == "counts" else None)
+    by_counts = reader != "lowpass"
+    signals = study.signals if not by_counts else replace(study.signals, reader="counts", step=step, lines=LINE_MODES[reader])
     begun = time.process_time()
     states = observed_states(model, q, record.rate, signals)
     spent = time.process_time() - begun
@@ -94,8 +96,8 @@ def estimated(record: Record, q: Array, step: float, reader: str) -> dict[str, A
     torque = decimated_torque(record.tau, selection)
     row: dict[str, Any] = {f"{reader}_s": round(spent, 3)}
     several = {reader: states}
-    if reader == "counts":
-        several["alike"] = filtered_states(record.q, record.rate, study.signals)
+    if by_counts:
+        several[f"{reader}_alike"] = filtered_states(record.q, record.rate, study.signals)
     for label, x in several.items():
         e = estimate_of(observation_from_states(model, x, torque, selection, columns=names), study.estimate)
         row |= {label: [e[name] for name in MAIN], f"{label}_sigma": e.sigma_corrected[[e.names.index(name) for name in MAIN]].tolist()}
@@ -125,7 +127,7 @@ def run(key: Mapping[str, Any]) -> dict[str, Any]:
     step = 2 * np.pi / key["per_turn"]
     q = quantised(record.q, step, key["seed"], key["lines"])
     row: dict[str, Any] = dict(key)
-    for reader in ("lowpass", "counts"):
+    for reader in ("lowpass", "counts", *(["estimated"] if key["lines"] else [])):
         row |= estimated(record, q, step, reader)
     return row
 
@@ -175,8 +177,11 @@ def table(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
         groups.setdefault(tuple(r[name] for name in names), []).append(r)
     lines: list[Sequence[str]] = [(*names, *HEAD)]
     for key, group in groups.items():
-        errors = (percent(group, "lowpass"), percent(group, "counts"), percent(group, "counts", "alike"))
+        errors = (percent(group, "lowpass"), percent(group, "counts"), percent(group, "counts", "counts_alike"))
         lines.append((*map(str, key), str(len(group)), *(text for e in errors for text in line(e))))
+        if "estimated" in group[0]:
+            errors = (percent(group, "lowpass"), percent(group, "estimated"), percent(group, "estimated", "estimated_alike"))
+            lines.append((f"{key[0]}, estimated", str(len(group)), *(text for e in errors for text in line(e))))
     return aligned(lines)
 
 

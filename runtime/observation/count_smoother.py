@@ -13,15 +13,19 @@ References: Minka (2001); Cunningham, Hennig and Lacoste-Julien (2011), boxes; M
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.special import erfcx
 
+from runtime.observation.line_errors import LineErrors, line_errors
 from runtime.observation.spline_posterior import Basis, Factor
 
 Array = np.ndarray
+Lines = Literal["detected", "estimated"] | float
 
 KNOTS = 2e-3
 """Distance of knots, s, or of samples where that is larger."""
@@ -45,7 +49,7 @@ class Smoothed:
     """Posterior of n channels, in steps.
 
     basis : Basis.   c : coefficients, shape (n, P).   Z : covariances, shape (4, n, P).   factor : of A.   density : r, shape (n, M), steps^2/s^5.
-    origin : shape (n, 1), what was taken off the counts.
+    origin : shape (n, 1), what was taken off the counts.   errors : those of the lines, by channel.
     """
 
     basis: Basis
@@ -54,6 +58,7 @@ class Smoothed:
     factor: Factor
     density: Array
     origin: Array
+    errors: tuple[LineErrors, ...] = ()
 
     def state(self, order: int) -> tuple[Array, Array]:
         """Mean and deviation of the position, or of its derivative of that order, shape (n, N) each."""
@@ -66,10 +71,10 @@ class Smoothed:
         return np.asarray(self.basis.at_samples(self.c + self.factor.draw(rng))[:, : self.basis.N] + self.origin)
 
 
-def smoothed(counts: Array, Ts: float, *, lines: Array | float = LINES) -> Smoothed:
+def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed:
     """Posterior of counts, shape (n, N); nan: a sample that is missing.
 
-    lines : error of lines, steps.
+    lines : whether errors of the lines are "detected", and bounds widened, or "estimated"; or their deviation in steps.
     """
     n, N = counts.shape
     basis = Basis(N, n, max(1, round(KNOTS / Ts)), Ts)
@@ -78,27 +83,36 @@ def smoothed(counts: Array, Ts: float, *, lines: Array | float = LINES) -> Smoot
     origin = np.asarray(np.round(np.nanmean(counts, axis=1)))[:, None]
     y = np.zeros(known.shape)
     y[:, :N] = np.where(known[:, :N], counts - origin, 0.0)
-    tau, nu = _from_changes(y, known)
+    given = LINES if isinstance(lines, str) else lines
+    errors = [LineErrors(given, 0, np.zeros(0), given)] * n
+    tau, nu = _from_changes(y, known, errors)
     density = np.full((n, basis.M), _first_density(y[:, :N]))
-    c = np.zeros((n, basis.P))
-    e2 = np.square(lines)
-    for number in range(-FIRST, PASSES):
-        for _ in range(2 if number == -FIRST else 1):
-            factor = Factor.of(basis.precision(tau, density))
-            c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), density, c))
+    tau, nu, c, density = _passed(basis, tau, nu, density, np.zeros((n, basis.P)))
+    if isinstance(lines, str):
+        errors = line_errors(basis, y, known, c, density, Ts, estimate=lines == "estimated")
+        if any(each.deviation > LINES for each in errors):
+            tau, nu = _from_changes(y, known, errors)
+            tau, nu, c, density = _passed(basis, tau, nu, density, c)
+    sites = _sites(y, known, density, Ts)
+    tau, nu = np.where(sites, tau, 0.0), np.where(sites, nu, 0.0)
+    of = np.nonzero(sites)[0]
+    low, high = y[sites] - 0.5, y[sites] + 0.5
+    for j, each in enumerate(errors):
+        if len(each.shift):
+            number = np.round(y[j, sites[j]]).astype(int)
+            low[of == j] += each.of(number - 1)
+            high[of == j] += each.of(number)
+    e2 = np.array([each.left for each in errors])[of] ** 2
+    for _ in range(PASSES):
+        factor = Factor.of(basis.precision(tau, density))
+        c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), density, c))
         Z = factor.inverse()
         density = _density(basis, c, Z, density)
-        if number < 0:
-            continue
-        if number == 0:
-            sites = _sites(y, known, density, Ts)
-            tau, nu = np.where(sites, tau, 0.0), np.where(sites, nu, 0.0)
-            middle = y[sites]
         x, v, t, u = basis.at_samples(c)[sites], basis.variances(Z)[sites], tau[sites], nu[sites]
         cavity = 1 / np.maximum(1 / v - t, 0.02 / v)
         m = cavity * (x / v - u)
         s = np.sqrt(cavity + e2)
-        g, H = box_moments((middle - 0.5 - m) / s, (middle + 0.5 - m) / s)
+        g, H = box_moments((low - m) / s, (high - m) / s)
         g, H = g / s, H / s**2
         left = 1 - cavity * H
         t_new, u_new = H / left, (g + H * m) / left
@@ -106,7 +120,17 @@ def smoothed(counts: Array, Ts: float, *, lines: Array | float = LINES) -> Smoot
         tau[sites], nu[sites] = t + DAMPING * (t_new - t), u + DAMPING * (u_new - u)
         if change < CHANGE:
             break
-    return Smoothed(basis, c, Z, factor, density, origin)
+    return Smoothed(basis, c, Z, factor, density, origin, tuple(errors))
+
+
+def _passed(basis: Basis, tau: Array, nu: Array, density: Array, c: Array) -> tuple[Array, Array, Array, Array]:
+    """The spline through Gaussian sites, and the jerk density that goes with it, after FIRST passes."""
+    for number in range(FIRST):
+        for _ in range(2 if number == 0 else 1):
+            factor = Factor.of(basis.precision(tau, density))
+            c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), density, c))
+        density = _density(basis, c, factor.inverse(), density)
+    return tau, nu, c, density
 
 
 def _sites(y: Array, known: Array, density: Array, Ts: float) -> Array:
@@ -143,7 +167,7 @@ def _first_density(y: Array) -> Array:
     return np.asarray((np.ptp(y, axis=1, keepdims=True) + 1) ** 2 * 1e10)
 
 
-def _from_changes(y: Array, known: Array) -> tuple[Array, Array]:
+def _from_changes(y: Array, known: Array, errors: Sequence[LineErrors]) -> tuple[Array, Array]:
     """First sites: at the two samples around a change of the count; a hundredth of an interval at every other sample."""
     tau = np.where(known, 0.06, 0.0)
     nu = tau * y
@@ -155,7 +179,8 @@ def _from_changes(y: Array, known: Array) -> tuple[Array, Array]:
         before, after = at[e], at[e + 1]
         t, line = (before + after) / 2, (y[j, before] + y[j, after]) / 2
         speed = (np.interp(t + 25, t, line) - np.interp(t - 25, t, line)) / 50  # steps a sample
-        weight = 6 / np.clip(np.abs(speed) * (after - before), 0.02, 1) ** 2
+        line = line + errors[j].of(np.floor(line).astype(int))
+        weight = 6 / (np.clip(np.abs(speed) * (after - before), 0.02, 1) ** 2 + 12 * errors[j].left ** 2)
         for samples in (before, after):
             np.add.at(tau[j], samples, weight)
             np.add.at(nu[j], samples, weight * (line + (samples - t) * speed))

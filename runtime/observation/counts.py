@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import erf
 
-from runtime.observation.count_smoother import LINES, Smoothed, smoothed
+from runtime.observation.count_smoother import Lines, Smoothed, smoothed
 from runtime.observation.encoder_lattice import Lattice, lattice, unwrapped
 
 Array = np.ndarray
@@ -90,7 +90,7 @@ def read_counts(
     step: Array | Sequence[float] | float | None = None,
     phase: Array | None = None,
     *,
-    lines: float = LINES,
+    lines: Lines = "detected",
     name: str = "record",
 ) -> Reading:
     """Positions, velocities and accelerations from counts, with deviations.
@@ -105,8 +105,9 @@ def read_counts(
         Step of the encoders; default: from the record.
     phase : ndarray, shape (n,), rad or m, optional
         A position of the lattice of each encoder, the middle of an interval; default: from the record.
-    lines : float
-        Deviation of the lines from equal distances, steps.
+    lines : "detected", "estimated" or float
+        Lines at unequal distances: their deviation is detected, and bounds are widened by it; lines are estimated with the motion; or their
+        deviation is known, steps.
     name : str
         What errors call the record.
 
@@ -124,10 +125,10 @@ def read_counts(
     return _reading(counts, rate, known, lines, said)
 
 
-def _reading(counts: Array, rate: float, known: Lattice, lines: float, said: Sequence[str]) -> Reading:
+def _reading(counts: Array, rate: float, known: Lattice, lines: Lines, said: Sequence[str]) -> Reading:
     N, n = counts.shape
     states = [np.empty((N, n)) for _ in range(6)]
-    density, parts = np.zeros(n), []
+    density, parts, found = np.zeros(n), [], dict.fromkeys((*known.findings, *said))
     for begin, first, stop, end in stretches(N):
         part, read = read_stretch(counts[begin:end], rate, lines)
         for x, own in zip(states, read, strict=True):
@@ -136,16 +137,18 @@ def _reading(counts: Array, rate: float, known: Lattice, lines: float, said: Seq
             part = replace(part, begin=begin, first=first, stop=stop)
             density[part.moving] += part.smoothed.density.mean(axis=1) * (stop - first) / N
             parts.append(part)
+            uneven = [(j, each.finding) for j, each in zip(part.moving, part.smoothed.errors, strict=True) if each.finding]
+            found.update({f"encoder {j + 1}: {text}": None for j, text in uneven})
     for i, x in enumerate(states):
         x *= known.step
         if i == 0:
             x += known.phase
     q, qd, qdd, s_q, s_qd, s_qdd = states
     jerk = np.sqrt(density) * known.step
-    return Reading(q, qd, qdd, s_q, s_qd, s_qdd, jerk, known.step, known.phase, (*known.findings, *said), tuple(parts))
+    return Reading(q, qd, qdd, s_q, s_qd, s_qdd, jerk, known.step, known.phase, tuple(found), tuple(parts))
 
 
-def read_stretch(counts: Array, rate: float, lines: float) -> tuple[Part | None, list[Array]]:
+def read_stretch(counts: Array, rate: float, lines: Lines) -> tuple[Part | None, list[Array]]:
     """Posterior of counts, shape (N, n), and q, qd, qdd, s_q, s_qd, s_qdd, shape (N, n) each, in steps; None where nothing moves.
 
     An encoder whose count never changes rests in the middle of its interval.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from runtime.errors import SettingsError
-from runtime.observation.count_smoother import LINES
 from runtime.observation.counts import read_stretch, stretches
 from runtime.observation.encoder_lattice import Lattice, lattice, unwrapped
 from runtime.records.stream import Queue
@@ -30,7 +29,7 @@ class CountStage:
     """
 
     def __init__(self, samples: int, rate: float, signals: Signals, name: str) -> None:
-        self.rate, self.step, self.name = rate, signals.step, name
+        self.rate, self.step, self.lines, self.name = rate, signals.step, signals.lines, name
         self.left = stretches(samples)
         self.held, self.begin = Queue(), 0  # samples from `begin` of the record on
         self.lattice: Lattice | None = None
@@ -48,7 +47,7 @@ class CountStage:
             counts, said = unwrapped(self.lattice.counts(own), name=self.name)
             if said:
                 raise SettingsError(f"{said[0]}; such a record is read as a whole, set stream: off", path=("signals", "reader"))
-            _, states = read_stretch(counts, self.rate, LINES)
+            _, states = read_stretch(counts, self.rate, self.lines)
             kept = slice(first - begin, stop - begin)
             q.append(self.lattice.position(states[0][kept]))
             s.append(states[4][kept] * self.lattice.step)

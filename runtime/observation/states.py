@@ -49,7 +49,7 @@ def observed_states(
     if signals.reader == "lowpass":
         return filtered_states(q, rate, signals)
     drives = encoder_drives(model, signals, drives)
-    return joint_states(read_counts(encoder_position(q, drives), rate, signals.step, name=name), rate, signals, drives)
+    return joint_states(read_counts(encoder_position(q, drives), rate, signals.step, lines=signals.lines, name=name), rate, signals, drives)
 
 
 def joint_states(reading: Reading, rate: float, signals: Signals, drives: Drives | None) -> States:

@@ -114,6 +114,8 @@ class Signals(Settings):
         Step of the encoders, for counts; null: from the record.
     side : str
         Side of the encoders, for counts: joint, or motor by the drives of the robot.
+    lines : str
+        Lines of the encoders at unequal distances, for counts: detected widens the bounds by their deviation; estimated finds them with the motion.
     """
 
     median: OddWindow = 5
@@ -123,9 +125,10 @@ class Signals(Settings):
     reader: Literal["lowpass", "counts"] = "lowpass"
     step: PerJoint[Positive] | None = None
     side: Literal["joint", "motor"] = "joint"
+    lines: Literal["detected", "estimated"] = "detected"
 
     def __post_init__(self) -> None:
-        for key, given in (("step", self.step is not None), ("side", self.side != "joint")):
+        for key, given in (("step", self.step is not None), ("side", self.side != "joint"), ("lines", self.lines != "detected")):
             require(self.reader == "counts" or not given, "given, but reader is lowpass; it is a setting of reader: counts", key)
 
 

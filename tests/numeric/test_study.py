@@ -68,7 +68,16 @@ def test_written_settings_read_back(study):
         "controller",
         "excitation",
     }
-    assert set(mapping["signals"]) == {"median", "lowpass", "ends", "decimate", "reader", "step", "side"}  # complete, defaults filled
+    assert set(mapping["signals"]) == {
+        "median",
+        "lowpass",
+        "ends",
+        "decimate",
+        "reader",
+        "step",
+        "side",
+        "lines",
+    }  # complete, defaults filled
 
 
 def test_a_filter_is_switched_off_by_null():

@@ -1,0 +1,184 @@
+"""Lines of an encoder that are not evenly spaced: their size by evidence, their places estimated with the motion.
+
+A change of the count, from k to k + 1 between two samples, says that the motion crossed line k + 1/2 + delta_k there:
+
+    x(t_e) = k + 1/2 + delta_k + n_e           n_e of variance (qd Ts)^2/12, time alone; delta_k of variance e^2, the same at every crossing
+    marginal of the changes, x integrated out     log N = sum log w_e/2 - log|A|/2 + sum log(h/r_i)/2 - residual/2,   w_e = 1/((qd Ts)^2/12 + e^2)
+    S delta = B' A^-1 g - B' ...                  S = diag(sum w) + 1/e^2 - B' A^-1 B,  B of a class: sum of w_e b_e over its changes
+
+e is the value of SIZES of largest evidence, the jerk density following each. Classes of lines are those of period two and four (quadrature) and single
+lines crossed at least CROSSINGS times, in both directions; e^2 of a class by expectation maximisation. What is estimated is taken off the bounds, and
+what is left widens them.
+
+References: Harville (1977), random effects; Merry, van de Molengraft and Steinbuch (2010) for encoders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import dpbtrs
+
+from runtime.observation.spline_posterior import Basis, Factor
+
+Array = np.ndarray
+
+SIZES = (0.01, 0.03, 0.06, 0.12, 0.25)
+"""Deviations of lines that are compared, steps."""
+COMPARED, CLEAR = 0.04, 5.0
+"""Deviation whose evidence is compared with that of even lines, and the difference that tells."""
+PASSES = 3
+FEWEST = 50
+"""Changes below which lines count as even."""
+CROSSINGS = 5
+MOST = 1500
+"""Lines of one encoder that are estimated one by one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """Changes of the count of one encoder: sample before, sample after, position of the line less its number's shift, number of the line, direction."""
+
+    before: Array
+    after: Array
+    line: Array
+    number: Array
+    up: Array
+
+    @classmethod
+    def of(cls, y: Array, known: Array) -> Changes:
+        """Changes by one count, of y, shape (N,)."""
+        at = np.flatnonzero(known)
+        step = np.diff(y[at])
+        e = np.flatnonzero(np.abs(step) == 1)
+        line = (y[at[e]] + y[at[e + 1]]) / 2
+        return cls(at[e], at[e + 1], line, np.floor(line).astype(int), step[e] > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class LineErrors:
+    """Of one encoder: deviation of the lines, steps; shift of the lines first, first + 1 ..., what is left of the deviation once shifted; a sentence."""
+
+    deviation: float
+    first: int
+    shift: Array
+    left: float
+    finding: str = ""
+
+    def of(self, number: Array) -> Array:
+        """Shifts of lines by their number; 0 for lines never crossed."""
+        place = number - self.first
+        inside = (place >= 0) & (place < len(self.shift))
+        return (
+            np.where(inside, self.shift[np.clip(place, 0, max(len(self.shift) - 1, 0))], 0.0) if len(self.shift) else np.zeros(len(number))
+        )
+
+
+def evidence(basis: Basis, changes: Sequence[Changes], c: Array, density: Array, e: float, Ts: float) -> tuple[Array, Array]:
+    """Log evidence of the changes of every encoder with lines of deviation e, shape (n,), and the jerk density that goes with it, shape (n, M)."""
+    speed = basis.at_samples(c, 1) * Ts
+    tau, nu = np.zeros((2, basis.n, basis.padded))
+    fixed = np.zeros(basis.n)
+    for j, each in enumerate(changes):
+        w, value = _weights(each, speed[j], e)
+        np.add.at(tau[j], each.before, w)
+        np.add.at(nu[j], each.before, w * value)
+        fixed[j] = 0.5 * np.log(w).sum() - 0.5 * (w * value**2).sum()
+    r, zero = density, np.zeros_like(c)
+    for number in range(PASSES + 1):
+        factor = Factor.of(basis.precision(tau, r))
+        g = basis.gradient(nu, r, zero)
+        c = factor.solve(g)
+        if number < PASSES:
+            squares, determined = basis.jerk(c) ** 2 * basis.h, 1 - basis.jerk_variances(factor.inverse()) * basis.h / r
+            r = np.broadcast_to(squares.mean(axis=1, keepdims=True) / np.maximum(determined.mean(axis=1, keepdims=True), 1e-9), r.shape)
+    halves = np.log(factor.L[0]).reshape(basis.n, -1).sum(axis=1) + 0.5 * np.log(r).sum(axis=1)
+    return fixed - halves + 0.5 * (g * c).sum(axis=1), r
+
+
+def _weights(changes: Changes, speed: Array, e: Array | float) -> tuple[Array, Array]:
+    """w_e and the position at the sample before the change, of every change; speed, shape (m M,), steps a sample."""
+    s = speed[changes.before]
+    w = 1 / ((s * (changes.after - changes.before)) ** 2 / 12 + np.square(e))
+    return w, changes.line + (changes.before - changes.after) / 2 * s
+
+
+def line_errors(basis: Basis, y: Array, known: Array, c: Array, density: Array, Ts: float, *, estimate: bool) -> list[LineErrors]:
+    """Size of the errors of the lines of every encoder, and their places where `estimate` asks for them.
+
+    y, known, c, density : as in `runtime.observation.count_smoother`, c from the changes alone.
+    """
+    changes = [Changes.of(y[j], known[j]) for j in range(basis.n)]
+    judged = {e: evidence(basis, changes, c, density, e, Ts) for e in (SIZES[0], COMPARED)}
+    uneven = (judged[COMPARED][0] > judged[SIZES[0]][0] + CLEAR) & np.array([len(each.line) >= FEWEST for each in changes])
+    if not uneven.any():
+        return [LineErrors(SIZES[0], 0, np.zeros(0), SIZES[0])] * basis.n
+    judged |= {e: evidence(basis, changes, c, density, e, Ts) for e in SIZES[1:]}
+    errors = []
+    for j, each in enumerate(changes):
+        deviation = max(judged, key=lambda e: float(judged[e][0][j])) if uneven[j] else SIZES[0]
+        if deviation == SIZES[0] or not estimate:
+            text = f"lines uneven by {deviation:g} steps (rms); bounds are widened" if uneven[j] else ""
+            errors.append(LineErrors(deviation, 0, np.zeros(0), deviation, text))
+        else:
+            alone = Basis(basis.N, 1, basis.m, Ts)
+            r = judged[deviation][1][j : j + 1]
+            first, shift, left, single = _shifts(alone, each, c[j : j + 1], r, deviation, Ts)
+            text = f"lines uneven by {deviation:g} steps (rms); period of four and {single} single lines estimated, {left:.2g} steps left"
+            errors.append(LineErrors(deviation, first, shift, left, text))
+    return errors
+
+
+def _shifts(basis: Basis, changes: Changes, c: Array, density: Array, deviation: float, Ts: float) -> tuple[int, Array, float, int]:
+    """Shifts of all lines from the first one crossed on, the deviation left, and how many lines have a shift of their own."""
+    first, last = int(changes.number.min()), int(changes.number.max())
+    place = changes.number - first
+    size = last - first + 1
+    ups, downs = np.bincount(place[changes.up], minlength=size), np.bincount(place[~changes.up], minlength=size)
+    own = np.flatnonzero((ups + downs >= CROSSINGS) & (ups > 0) & (downs > 0))[:MOST]
+    classes = np.full(size, -1)
+    classes[own] = np.arange(len(own))
+    quadrature = len(own) + np.arange(size) % 4
+    shift, left = np.zeros(size), deviation
+    # lines of no class of their own keep e in their weight; those of a class have time alone
+    of = classes[place]
+    w, value = _weights(changes, basis.at_samples(c, 1)[0] * Ts, SIZES[0])
+    time = 1 / w
+    variance_own = variance_period = deviation**2 / 2
+    for _ in range(4):
+        w = 1 / (time + np.where(of >= 0, 0.0, variance_own))
+        tau, nu = np.zeros((1, basis.padded)), np.zeros((1, basis.padded))
+        np.add.at(tau[0], changes.before, w)
+        np.add.at(nu[0], changes.before, w * value)
+        factor = Factor.of(basis.precision(tau, density))
+        zero = np.zeros_like(c)
+        g = basis.gradient(nu, density, zero)
+        count = len(own) + 4
+        B, W, y = np.zeros((basis.P, count)), np.zeros((count, count)), np.zeros(count)
+        member = np.zeros((len(w), 2), dtype=int)
+        member[:, 0], member[:, 1] = of, quadrature[place]
+        for column in range(2):
+            use = member[:, column] >= 0
+            np.add.at(y, member[use, column], (w * value)[use])
+            for a in range(4):
+                interval, u = changes.before[use] // basis.m, changes.before[use] % basis.m
+                np.add.at(B, (interval + a, member[use, column]), w[use] * basis.values[0][u, a])
+            for other in range(2):
+                both = use & (member[:, other] >= 0)
+                np.add.at(W, (member[both, column], member[both, other]), w[both])
+        solved = np.asarray(dpbtrs(factor.L, B, lower=1)[0])
+        S = W - B.T @ solved
+        prior = np.concatenate([np.full(len(own), 1 / variance_own), np.full(4, 1 / variance_period)])
+        C = np.linalg.inv(S + np.diag(prior))
+        delta = C @ (solved.T @ g[0] - y)
+        if len(own):
+            variance_own = float(np.mean(delta[: len(own)] ** 2 + np.diag(C)[: len(own)]))
+        variance_period = float(np.mean(delta[len(own) :] ** 2 + np.diag(C)[len(own) :]))
+    shift = delta[len(own) :][np.arange(size) % 4]
+    shift[own] += delta[: len(own)]
+    unknown = np.ones(len(place)) * variance_own
+    unknown[of >= 0] = np.diag(C)[of[of >= 0]]
+    left = float(np.sqrt(np.mean(unknown)))
+    return first, shift, max(left, SIZES[0]), len(own)
