@@ -120,9 +120,13 @@ def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, st
     scale = scales(physical)
     space, rows = solutions(physical.rows(names), X, scale), limit_rows(physical, limits)
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
-    least = float(np.clip(min(physical.smallest(start).values()) / 2, LEAST**2, LEAST))  # not zero, which means another problem
-    nearest = closest(np.diag(1 / scale), chi0 / scale, physical.conditions, rows, space, least=least)
-    kept = nearest.solved and min(physical.smallest(nearest.chi).values()) >= 0
+    open_ = tuple(c for c in physical.conditions if (np.abs(space.basis[list(c.numbers)]).T > ROUNDING * scale[list(c.numbers)]).any())
+    if len(open_) < len(physical.conditions):  # X alone decides the others, such as a friction of zero
+        inner = margin(open_, rows, space)
+        start = inner.chi if inner.solved else start
+    least = float(np.clip(min((c.smallest(start) for c in open_), default=LEAST) / 2, LEAST**2, LEAST))
+    nearest = closest(np.diag(1 / scale), chi0 / scale, open_, rows, space, least=least)
+    kept = nearest.solved and all(c.smallest(nearest.chi) >= 0 for c in open_)
     return nearest.chi if kept else start
 
 

@@ -58,6 +58,8 @@ class Applied:
         Attributes and elements that the file did not have.
     placeless : mapping, SI
         Parameters that the format has no place for, by name.
+    placeless_sigma : mapping, SI
+        Their deviations.
     joints : mapping
         Names of their joints.
     spread : tuple of str
@@ -75,6 +77,7 @@ class Applied:
     changes: tuple[Change, ...]
     added: tuple[str, ...]
     placeless: Mapping[str, float]
+    placeless_sigma: Mapping[str, float]
     joints: Mapping[str, str]
     spread: tuple[str, ...]
     undetermined: tuple[str, ...]
@@ -117,7 +120,8 @@ class Applied:
         notes = [f"added: {'; '.join(self.added)}"] if self.added else []
         if self.placeless:
             listed = ", ".join(
-                f"{name} = {x:.6g}" + (f" ({self.joints[name]})" if name in self.joints else "") for name, x in self.placeless.items()
+                f"{name} = {x:.4g} ± {self.placeless_sigma[name]:.2g}" + (f" ({self.joints[name]})" if name in self.joints else "")
+                for name, x in self.placeless.items()
             )
             notes.append(f"no place in a {self.format}, set these in your program: {listed}")
         if self.spread:
@@ -147,6 +151,7 @@ class Applied:
                 "changes": [asdict(change) for change in self.changes],
                 "added": self.added,
                 "placeless": dict(self.placeless),
+                "placeless_sigma": dict(self.placeless_sigma),
                 "spread": self.spread,
                 "undetermined": self.undetermined,
                 "lost": self.lost,

@@ -20,7 +20,7 @@ from runtime.estimators.estimate import Estimate, load_estimate
 from runtime.model.generated import load_model
 from runtime.model.inertia import PhysicalModel, physical_model
 from symgen.description.files import SNAP, content_of, read_robot
-from symgen.description.robot import one_joint_parameters, parameter
+from symgen.description.robot import Robot, one_joint_parameters, parameter
 from symgen.description.tree import Array
 from symgen.description.tree_parts import Part
 from symgen.emit.certified import model as emitted
@@ -31,7 +31,7 @@ from symgen.update.robot_text import RobotText, read_text, require_same_frames
 from symgen.update.xml_edits import Source, same
 
 AGREE = 1e-9  # of the size of a parameter: the written file is read as what was to be written
-FEASIBLE = "; identify again with estimate: {method: feasible} in the study"
+FEASIBLE = "; set estimate: {method: feasible} in the study (study.yaml lies among the results) and identify again"
 NO_SHARE = 1e-9  # of the largest share
 UNITS = {"FV": "N*m*s/rad", "FS": "N*m", "Ia": "kg*m**2", "OFFSET": "N*m", "K": "N*m/rad"}
 SLIDING = {"FV": "N*s/m", "FS": "N", "Ia": "kg", "OFFSET": "N", "K": "N/m"}
@@ -71,6 +71,7 @@ def apply(
     described, of = (text.robot, text.file) if robot is None else (read_robot(robot)[0], Path(robot).name)
     require_same_frames(text, described, of)
     result = _estimate(estimate)
+    _require_same_joints(result, described, of)
     physical = physical_model(load_model(emitted(described)))
     names, X, lost = _known(result, physical, of)
     links = text.links
@@ -97,6 +98,22 @@ def _estimate(given: Any) -> Estimate:
     if not isinstance(given, Estimate):
         raise DescriptionError(f"{type(given).__name__} given as estimate; expected an Estimate, an Identification, or their estimate.json")
     return given
+
+
+def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
+    """Raise DescriptionError where the estimate tells names of joints, and they are not those of the robot."""
+    theirs = result.provenance.get("labels")
+    if not isinstance(theirs, Mapping):
+        return
+    numbers = {f"q{j}" for j in robot.moving} | {q for q in theirs if q not in {f"q{f.j}" for f in robot.frames}}
+    different = sorted(q for q in numbers if theirs.get(q) != robot.labels.get(int(q[1:]) if q[1:].isdigit() else 0))
+    if different:
+        q = different[0]
+        ours = robot.labels.get(int(q[1:])) if q[1:].isdigit() else None
+        raise DescriptionError(
+            f"{q} of the estimate is {theirs.get(q, 'no joint with a name')!s:.60}, of {of} {ours or 'no joint with a name'}: say --chain and --lock as when the robot was converted, "
+            "or name the robot file that was identified (--robot)"
+        )
 
 
 def _inertial(physical: PhysicalModel) -> set[str]:
@@ -162,6 +179,7 @@ def _written(
         changes=tuple(changes),
         added=tuple(source.added),
         placeless=placeless,
+        placeless_sigma={name: _norm(found.gain[found.elements[name]] @ root) for name in placeless},
         joints={name: text.table.joint[own[name][1]].name for name in placeless if name in own},
         spread=found.spread,
         undetermined=tuple(undetermined),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from symgen.description.robot import Robot
+from symgen.description.robot import FIXED, Frame, Robot
 from symgen.description.tree import Array, Tree
 from symgen.description.tree_frames import Table, placed
 from symgen.description.tree_parts import Part, part_of
@@ -117,8 +117,8 @@ def read_text(content: bytes, path: Path, nearly: float, part: Part) -> RobotTex
 
 def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
     """Raise DescriptionError unless the frames of `robot` are those of the text: parameters of a link mean nothing in another frame."""
-    ours, theirs = ({f.j: f for f in one.frames if f.sigma != 2} for one in (text.robot, robot))
-    different = sorted(ours.keys() ^ theirs.keys())
+    ours, theirs = ({f.j: f for f in one.frames} for one in (text.robot, robot))
+    different = [j for j in ours.keys() ^ theirs.keys() if j in ours or theirs[j].sigma != FIXED]  # kept frames come last
     for j in ours.keys() & theirs.keys():
         rows = [_row(f, one.constants) for f, one in ((ours[j], text.robot), (theirs[j], robot))]
         if (ours[j].ant, ours[j].sigma) != (theirs[j].ant, theirs[j].sigma) or np.abs(rows[0] - rows[1]).max() > POSE:
@@ -130,5 +130,5 @@ def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
         )
 
 
-def _row(f: object, constants: Mapping[str, float]) -> Array:
+def _row(f: Frame, constants: Mapping[str, float]) -> Array:
     return np.array([getattr(f, name).value(constants) for name in ("gamma", "b", "alpha", "d", "theta0", "r0")])

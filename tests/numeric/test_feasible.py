@@ -372,3 +372,19 @@ def test_tx40_record(tx40, tx40_data) -> None:
         assert errors[1] < 0.98 * errors[0]
     system = least_squares(seen, FEASIBLE, {})
     assert residual_norm(system.weighted, found.X) == pytest.approx(found.residual_norm, rel=1e-9)
+
+
+def test_standard_parameters_where_a_friction_is_zero(tx40) -> None:
+    """A condition on its limit, which X alone decides, leaves the others free: the set is the nearest to the robot file, not the one of the largest margin."""
+    physical = physical_model(tx40)
+    chi = np.array([tx40.VALUES.get(name, 0.0) for name in physical.standard])
+    chi[physical.standard.index("FS1")] = 0.0
+    for j in (2, 3):  # denser links, so that the nearest set is another one
+        chi[physical.link(j)] *= 1.1
+    X = physical.K @ chi
+    found = standard_parameters(physical, physical.base, X)
+    values = np.array([tx40.VALUES.get(name, 0.0) for name in physical.standard])
+    scale = scales(physical)
+    np.testing.assert_allclose(physical.K @ found, X, atol=1e-9)
+    assert np.linalg.norm((found - values) / scale) <= np.linalg.norm((chi - values) / scale) + 1e-6
+    assert min(c.smallest(found) for c in physical.conditions) > -1e-9

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from campaign import campaign
 from numpy.testing import assert_allclose
 
 import symgen
+from oracles import mjcf_robots, urdf_robots
 from oracles.applying import exact, motion, other_values, skeleton, torques_of
 from oracles.mjcf_robots import ARM, BRANCHES, GRIPPER
 from runtime.errors import InputError
@@ -89,7 +91,7 @@ def test_what_is_added_is_told(tmp_path) -> None:
     model = symgen.model(read_robot(path)[0])
     applied = symgen.apply(exact(model, other_values(model, 4, offset=0.3) | {"FV2": 0.7, "Ia2": 0.2}), path)
     assert any("<dynamics> in <joint>" in line for line in applied.added) and 'damping="0.7"' in applied.content.decode()
-    assert {"Ia2", "OFFSET1", "OFFSET2"} == applied.placeless.keys() and "Ia2 = 0.2 (elbow)" in str(applied)
+    assert {"Ia2", "OFFSET1", "OFFSET2"} == applied.placeless.keys() and "Ia2 = 0.2 ± 0.001 (elbow)" in str(applied)
     row = next(c for c in applied.changes if c.place == "joint 'elbow'" and c.number == "damping")
     assert (row.before, row.told_by) == (0.0, "record") and row.after == pytest.approx(0.7, abs=1e-12) and row.sigma == pytest.approx(1e-3)
     assert "mass" in " ".join(line for line in applied.undetermined if "upper" in line)
@@ -135,6 +137,9 @@ def test_estimates_of_other_robots_are_refused(tmp_path) -> None:
         symgen.apply(exact(tx40, dict(tx40.VALUES)), path)
     with pytest.raises(DescriptionError, match="other frames"):
         symgen.apply(exact(tx40, dict(tx40.VALUES)), path, robot="tx40")
+    named = replace(exact(symgen.model(path), dict(symgen.model(path).VALUES)), provenance={"labels": {"q1": "shoulder", "q2": "wrist"}})
+    with pytest.raises(DescriptionError, match=r"q2 of the estimate is wrist, of arm\.urdf elbow: say --chain"):
+        symgen.apply(named, path)
     with pytest.raises(DescriptionError, match="float given as estimate"):
         symgen.apply(1.0, path)
     with pytest.raises(InputError, match="nowhere"):
@@ -257,8 +262,6 @@ def test_springs(tmp_path) -> None:
 
 def test_the_record_leaves_nan(tmp_path) -> None:
     """Base parameters that the record does not show keep the file's values, and are named."""
-    from dataclasses import replace
-
     path = written(tmp_path, "arm.urdf")
     model = symgen.model(read_robot(path)[0])
     estimate = exact(model, dict(model.VALUES) | {"FV1": 2.0, "FS1": 0.9})
@@ -270,3 +273,20 @@ def test_the_record_leaves_nan(tmp_path) -> None:
         and applied.lost == ("FS1",)
         and "FS1; the values of the file stay" in str(applied)
     )
+
+
+@campaign
+@pytest.mark.parametrize("seed", [1, 2, 4, 7])
+@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
+def test_trees_with_any_axes(suffix, seed, tmp_path) -> None:
+    """Frames in any direction, several joints of one body, fixed and bare links: own values leave every byte, others are read back."""
+    text = urdf_robots.random_tree(seed) if suffix == ".urdf" else mjcf_robots.random_tree(seed)
+    path = written(tmp_path, f"tree{suffix}", text)
+    model = symgen.model(read_robot(path)[0])
+    assert symgen.apply(exact(model, dict(model.VALUES)), path).content == path.read_bytes()
+    chi = other_values(model, seed)
+    applied = symgen.apply(exact(model, chi), path)
+    assert skeleton(applied.content, without=True) == skeleton(path.read_bytes(), without=True)
+    again = dict(read_robot(applied.write(tmp_path / f"new{suffix}"))[0].values) | dict(applied.placeless)
+    X = model.base_parameters(chi)
+    assert_allclose(model.base_parameters(again), X, rtol=1e-9, atol=1e-9 * np.abs(X).max())
