@@ -120,7 +120,8 @@ def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, st
     scale = scales(physical)
     space, rows = solutions(physical.rows(names), X, scale), limit_rows(physical, limits)
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
-    open_ = tuple(c for c in physical.conditions if (np.abs(space.basis[list(c.numbers)]).T > ROUNDING * scale[list(c.numbers)]).any())
+    reach = np.abs(space.basis).max(axis=1, initial=0.0) / scale
+    open_ = tuple(c for c in physical.conditions if reach[list(c.numbers)].max() > ROUNDING)
     if len(open_) < len(physical.conditions):  # X alone decides the others, such as a friction of zero
         inner = margin(open_, rows, space)
         start = inner.chi if inner.solved else start
