@@ -46,19 +46,31 @@ class Formula:
 
     def to_sympy(self) -> Any:
         """The formula as a sympy expression: exact rationals, real symbols under the names of the robot file. Imports sympy."""
-        import sympy
+        total: Any = 0
+        for name, c in self.combination.items():
+            total = total + sympy_expression(c) * sympy_expression(Expression.symbol(name))
+        return total
 
-        def symbol(name: str) -> Any:
-            return sympy.pi if name == "pi" else sympy.Symbol(name, real=True)
 
-        def call(function: str, argument: Expression) -> Any:
-            x = coefficient(argument)
-            return 1 / x if function == "inv" else getattr(sympy, function)(x)
+def sympy_expression(e: Expression, known: Mapping[str, Any] | None = None) -> Any:
+    """An expression in sympy: exact rationals, pi, real symbols; `known` are the values of some names. Imports sympy."""
+    import sympy
 
-        def coefficient(e: Expression) -> Any:
-            return e.evaluate(symbol, call, lambda c: sympy.Rational(c.numerator, c.denominator))
+    def symbol(name: str) -> Any:
+        if known and name in known:
+            return known[name]
+        return sympy.pi if name == "pi" else sympy.Symbol(name, real=True)
 
-        return sympy.Add(*(coefficient(c) * symbol(name) for name, c in self.combination.items()))
+    def factor(a: str | Number | Call) -> Any:
+        if isinstance(a, str):
+            return symbol(a)
+        if isinstance(a, Number):
+            return sympy.Rational(a.value.numerator, a.value.denominator)
+        x = sympy_expression(a.argument, known)
+        return 1 / x if a.function == "inv" else getattr(sympy, a.function)(x)
+
+    terms = (sympy.Mul(sympy.Rational(c.numerator, c.denominator), *(factor(a) ** n for a, n in m)) for m, c in e.terms.items())
+    return sympy.Add(*terms)
 
 
 class Printer(Generic[T]):

@@ -12,7 +12,7 @@ from typing import Any
 import sympy
 
 from symgen.derive.graph import Node
-from symgen.description.expression import Call, Expression
+from symgen.regroup.formula import sympy_expression
 from symgen.symbols.closed import ClosedForm
 from symgen.symbols.listing import Listing
 from symgen.symbols.symbolic_model import SymbolicModel
@@ -23,36 +23,19 @@ def symbol(name: str) -> Any:
     return sympy.pi if name == "pi" else sympy.Symbol(name, real=True)
 
 
-def of_expression(e: Expression, angles: Mapping[str, Any]) -> Any:
-    """An expression; `angles` are the values of the names C23, S23 ..."""
-    terms = []
-    for m, c in e.terms.items():
-        factors = [sympy.Rational(c.numerator, c.denominator)]
-        for a, n in m:
-            if isinstance(a, Call):
-                x = of_expression(a.argument, angles)
-                base = 1 / x if a.function == "inv" else getattr(sympy, a.function)(x)
-            else:
-                assert isinstance(a, str)
-                base = angles[a] if a in angles else symbol(a)
-            factors.append(base**n)
-        terms.append(sympy.Mul(*factors))
-    return sympy.Add(*terms)
-
-
 def of_closed(form: ClosedForm, angles: Mapping[str, Any]) -> Any:
     """A closed form, its factors kept."""
     products = []
     for g in form:
         inner = of_closed(g.inner, angles) if g.inner else 1
-        products.append(sympy.Mul(*(of_expression(e, angles) for e in (g.common, g.inside, g.parameters)), inner))
+        products.append(sympy.Mul(*(sympy_expression(e, angles) for e in (g.common, g.inside, g.parameters)), inner))
     return sympy.Add(*products)
 
 
 def of_model(model: SymbolicModel) -> Any:
     """The closed form of a model: a Matrix, a column of one for vectors, an expression for scalars."""
     closed = model.closed
-    angles = {name: (sympy.cos if name[0] == "C" else sympy.sin)(of_expression(e, {})) for name, e in closed.angles.items()}
+    angles = {name: (sympy.cos if name[0] == "C" else sympy.sin)(sympy_expression(e, {})) for name, e in closed.angles.items()}
     values = {place: of_closed(form, angles) for place, form in closed.entries.items()}
     if closed.denominator is not None:
         below = of_closed(closed.denominator, angles)

@@ -10,7 +10,7 @@ import sympy
 
 from oracles.random_robots import random_robot
 from symgen.description import load_robot
-from symgen.description.expression import call
+from symgen.description.expression import call, with_known_cosines
 from symgen.description.grammar import parse
 from symgen.regroup import mathml
 from symgen.regroup.formula import Formula, Plain, Python
@@ -26,6 +26,14 @@ def test_export_equals_text(robot) -> None:
     for b in regroup(robot).base:
         read = sympy.sympify(str(b.formula), locals=names, rational=True)  # our own text, not a user's
         assert sympy.expand(read - b.formula.to_sympy()) == 0, b.name
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_sympy_text_is_read_back(robot) -> None:
+    """To SymPy and back: the grammar of robot files reads what SymPy writes as the same formula."""
+    known = {*robot.parameters, *robot.constants}
+    for b in regroup(robot).base:
+        assert with_known_cosines(parse(str(b.formula.to_sympy()), known)) == with_known_cosines(parse(str(b.formula), known)), b.name
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
