@@ -25,16 +25,13 @@ from symgen.description.tree import Array
 from symgen.description.tree_parts import Part
 from symgen.emit.certified import model as emitted
 from symgen.errors import DescriptionError
-from symgen.update.applied import Applied, Change
-from symgen.update.nearest import NONE, FileLink, Nearest, nearest
-from symgen.update.robot_text import RobotText, read_text, require_same_frames
+from symgen.update.applied import Applied
+from symgen.update.nearest import NONE, nearest
+from symgen.update.robot_text import read_text, require_same_frames
+from symgen.update.writing import UNITS, Writing
 from symgen.update.xml_edits import Source, same
 
-AGREE = 1e-9  # of the size of a parameter: the written file is read as what was to be written
 FEASIBLE = "; set estimate: {method: feasible} in the study (study.yaml lies among the results) and identify again"
-NO_SHARE = 1e-9  # of the largest share
-UNITS = {"FV": "N*m*s/rad", "FS": "N*m", "Ia": "kg*m**2", "OFFSET": "N*m", "K": "N*m/rad"}
-SLIDING = {"FV": "N*s/m", "FS": "N", "Ia": "kg", "OFFSET": "N", "K": "N/m"}
 
 
 def apply(
@@ -84,10 +81,28 @@ def apply(
     try:
         absent = [*others, *(name for name, x in stated.items() if not x)]
         found = nearest(physical, links, stated | dict.fromkeys(others, 0.0), names, X, absent)
-        return _written(text, path, found, links, own, result, names, lost, part, nearly)
+        writing, source = Writing(text, found, own, _root(result, names)), Source(content)
+        rows = [*writing.links(source), *writing.joints(source)]
+        new = source.edited()
+        writing.require_read_back(read_text(new, path, nearly, part))
     except DescriptionError as error:
         again = FEASIBLE if error.message.startswith(NONE) and result.method != "feasible" else ""
         raise DescriptionError(error.message + again, file=error.file or path.name, line=error.line) from error
+    placeless = writing.placeless
+    return Applied(
+        file=path.name,
+        format=text.elements.format,
+        before=content,
+        content=new,
+        changes=tuple(row for row in rows if not same(row.before, row.after)),
+        added=tuple(source.added),
+        placeless=placeless,
+        placeless_sigma={name: writing.sigma(found.elements[name]) for name in placeless},
+        joints={name: text.table.joint[own[name][1]].name for name in placeless if name in own},
+        spread=found.spread,
+        undetermined=tuple(f"{row.place}: {row.number}" for row in rows if row.told_by == "file"),
+        lost=tuple(lost),
+    )
 
 
 def _estimate(given: Any) -> Estimate:
@@ -135,58 +150,6 @@ def _known(result: Estimate, physical: PhysicalModel, of: str) -> tuple[list[str
     return names, result.X[known], [name for name in physical.base if name not in names]
 
 
-def _written(
-    text: RobotText, path: Path, found: Nearest, links: Sequence[FileLink], own: Mapping[str, tuple[str, int]], result: Estimate,
-    names: Sequence[str], lost: list[str], part: Part, nearly: float,
-) -> Applied:  # fmt: skip
-    """The edited text, read again, with its changes."""
-    source, changes, undetermined = Source(text.content), [], []
-    root = _root(result, names)
-    moved = []
-    for link in links:
-        at = found.links[link.name]
-        place, ten = text.link(link), found.chi[at]
-        if np.allclose(ten, link.ten, rtol=1e-13, atol=1e-15):
-            ten = link.ten
-        else:
-            moved.append((place, ten))
-        rows = _link_changes(link, place.stated(), place, ten, found.gain[at] @ root, found.free[at], found.gain[at])
-        undetermined += [f"{row.place}: {row.number}" for row in rows if row.told_by == "file"]
-        changes += [row for row in rows if not same(row.before, row.after)]
-    text.write_links(source, moved)
-    for j, joint in text.table.joint.items():
-        mine = {family: name for name, (family, i) in own.items() if i == j and text.attribute(family, j)}
-        text.set_joint(source, j, {family: found.chi[found.elements[name]] for family, name in mine.items()})
-        units = SLIDING if joint.kind == "prismatic" else UNITS
-        for family, name in mine.items():
-            k = found.elements[name]
-            told = "record" if np.abs(found.free[k]).max() < NO_SHARE else "sum"
-            row = Change(f"joint {joint.name!a:.60}", str(text.attribute(family, j)), units[family], text.joint_values(j)[family],
-                         float(found.chi[k]), _norm(found.gain[k] @ root), told)  # fmt: skip
-            changes += [] if same(row.before, row.after) else [row]
-    placeless = {
-        name: float(found.chi[k])
-        for name, k in found.elements.items()
-        if (name not in own or not text.attribute(*own[name])) and not same(found.chi[k], found.chi0[k])
-    }
-    content = source.edited()
-    _require_read_back(read_text(content, path, nearly, part), found, own, text)
-    return Applied(
-        file=path.name,
-        format=text.elements.format,
-        before=text.content,
-        content=content,
-        changes=tuple(changes),
-        added=tuple(source.added),
-        placeless=placeless,
-        placeless_sigma={name: _norm(found.gain[found.elements[name]] @ root) for name in placeless},
-        joints={name: text.table.joint[own[name][1]].name for name in placeless if name in own},
-        spread=found.spread,
-        undetermined=tuple(undetermined),
-        lost=tuple(lost),
-    )
-
-
 def _root(result: Estimate, names: Sequence[str]) -> Array:
     """A root of the covariance of the known base parameters, (b, b), deviations corrected where they are; zero where there is none."""
     at = [result.names.index(name) for name in names]
@@ -195,45 +158,3 @@ def _root(result: Estimate, names: Sequence[str]) -> Array:
         factor = np.nan_to_num(np.fmax(result.sigma_corrected[at] / result.sigma[at], 1.0), nan=1.0, posinf=1.0)
     values, V = np.linalg.eigh(C * np.outer(factor, factor))
     return np.asarray(V * np.sqrt(np.maximum(values, 0.0)))
-
-
-def _norm(row: Array) -> float:
-    return float(np.linalg.norm(row))
-
-
-def _link_changes(link: FileLink, stated: Sequence[float], place: Any, ten: Array, root: Array, free: Array, gain: Array) -> list[Change]:
-    """One row for each number of a link: from, to, deviation, and what tells it."""
-    labels = [(q.name, q.unit, label) for q in place.quantities(ten) for label in q.labels]
-
-    def numbers(x: Array) -> Array:
-        return np.array([value for q in place.quantities(x) for value in q.values])
-
-    new = numbers(ten)
-    new = np.where([same(x, y) for x, y in zip(new, stated, strict=True)], stated, new)
-    step = 1e-6 * np.maximum(np.abs(ten), 1e-3 * np.abs(ten).max())
-    J = np.array([(numbers(ten + e) - numbers(ten - e)) / (2 * h) for h, e in zip(step, np.diag(step), strict=True)]).T
-    rows = []
-    for k, (name, unit, label) in enumerate(labels):
-        number = name if name == label else f"{name} {label}"
-        share, left = _norm(J[k] @ gain), _norm(J[k] @ free)
-        size = _norm(J[k]) or 1.0
-        told = "file" if share < 1e-6 * size else "record" if left < 1e-6 * size else "sum"
-        rows.append(Change(f"link {link.name!a:.60}", number, unit, float(stated[k]), float(new[k]), _norm(J[k] @ root), told))
-    return rows
-
-
-def _require_read_back(again: RobotText, found: Nearest, own: Mapping[str, tuple[str, int]], text: RobotText) -> None:
-    """Raise DescriptionError unless the written text says what was to be written."""
-    for link in again.links:
-        wanted = found.chi[found.links[link.name]] if link.name in found.links else np.zeros(10)
-        if np.abs(link.ten - wanted).max() > AGREE * max(float(np.abs(wanted).max()), AGREE):
-            raise DescriptionError(
-                f"link {link.name!a:.60} would be read with other values than written (compiler settings that bound inertia?)"
-            )
-    for name, (family, j) in own.items():
-        if text.attribute(family, j) and abs(again.joint_values(j)[family] - found.chi[found.elements[name]]) > AGREE:
-            raise DescriptionError(
-                f"joint {again.table.joint[j].name!a:.60} would be read with another {text.attribute(family, j)} than written"
-            )
-    if len(again.links) != len(found.links):
-        raise DescriptionError("a link would be read without inertia; its mass becomes zero")
