@@ -20,7 +20,7 @@ from symgen.emit.render import laid_out
 from symgen.emit.spec import Function, ModuleSpec, module_spec
 from symgen.errors import SymgenError
 from symgen.regroup.formula import Python
-from symgen.regroup.regrouping import Regrouping
+from symgen.regroup.regrouping import Regrouping, sign_conditions
 
 LANGUAGE = Python("ca")
 
@@ -46,6 +46,7 @@ def render(regrouping: Regrouping, *, command: str | None = None) -> str:
     values = context(spec, command, LANGUAGE, "ca.SX")
     functions = spec.functions
     coefficients = [c.symbols for b in regrouping.base for c in b.combination.values()]
+    coefficients += [ratio.symbols for _, ratio, _ in sign_conditions(regrouping)]
     dynamics = {*arguments(functions["inertia_matrix"]), *arguments(functions["bias"]), "tau"}
     takes = {
         **{name: arguments(f) for name, f in functions.items()},

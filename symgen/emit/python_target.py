@@ -57,6 +57,7 @@ def context(spec: ModuleSpec, command: str | None, language: Python, array: str,
             (
                 f"{source(language, ratio)} {'>' if sign > 0 else '<'} 0",
                 f"{name} holds where {ratio} is {'positive' if sign > 0 else 'negative'}",
+                name,
             )
             for name, ratio, sign in sign_conditions(regrouping)
         ],
