@@ -120,10 +120,10 @@ def regressor_program(regrouping: Regrouping, own: Sequence[str]) -> tuple[list[
 
 
 def _regressor(regrouping: Regrouping) -> Values:
-    joints = regrouping.robot.joints
-    places, program = regressor_program(regrouping, regrouping.own)
+    joints, own = regrouping.robot.joints, regrouping.own
+    places, program = regressor_program(regrouping, own)
     entries = [
-        Entry(((k, row),), value, f"Joint {joints[row]}", f"DG{joints[row]}{regrouping.own[k]}")
+        Entry(((k, row),), value, f"Joint {joints[row]}", f"DG{joints[row]}{own[k]}")
         for (k, row), value in zip(places, program.outputs, strict=True)
     ]
     return Values(tuple(sorted(entries, key=lambda entry: entry.places[0][::-1])), program.sections)

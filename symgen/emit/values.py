@@ -78,12 +78,12 @@ class Program:
         """`image`, or the equal node that was there before; `value` is that of the node, without the sign of the edge."""
         if image.sign < 0:
             return -self._numbered(-image, value)
-        value = np.broadcast_to(value, (SAMPLES,)) % self.p
-        for number in (0, 1, self.p - 1):
-            if (value == number).all() and image.node.op != CONST:
-                return number if number < 2 else -1
-        flip = value[0] > self.p // 2
-        key = tuple(int(v) for v in (-value % self.p if flip else value))
+        value = (value if len(value) == SAMPLES else np.repeat(value, SAMPLES)) % self.p
+        residues = value.tolist()
+        if residues[0] in (0, 1, self.p - 1) and len({*residues}) == 1 and image.node.op != CONST:
+            return residues[0] if residues[0] < 2 else -1
+        flip = residues[0] > self.p // 2
+        key = tuple(-x % self.p if flip else x for x in residues)
         if key in self._known:
             twin = self._known[key]
             return -twin if flip else twin
