@@ -17,6 +17,7 @@ from runtime.records.time_stamps import time_stamps
 Array = np.ndarray
 
 JITTER = 0.1  # sampling periods that stamps may be off the uniform grid where nothing is said
+HINT = "; where the clock alone is at fault, state record.rate without columns.t, or raise record.jitter (below 0.5)"
 RATE_TOLERANCE = 1e-3  # between a stated rate and that of the stamps, beyond what the jitter of the two ends makes
 
 
@@ -97,7 +98,9 @@ def rate_of(stamps: Stamps, t: Array) -> float:
             if regularity.regular and regularity.jitter <= stamps.jitter
             else f". {remedies(t, regularity, arrays=stamps.column is None)}"
         )
-        raise InputError(f"{e.message}. In all: {regularity.to_text(stamps.row)}{cure}", file=e.file, column=e.column, row=e.row) from None
+        raise InputError(
+            f"{e.message.removesuffix(HINT)}. In all: {regularity.to_text(stamps.row)}{cure}", file=e.file, column=e.column, row=e.row
+        ) from None
 
 
 def _require_uniform(stamps: Stamps, blocks: Iterable[Array], first: float, rate: float) -> None:
@@ -114,7 +117,7 @@ def _require_uniform(stamps: Stamps, blocks: Iterable[Array], first: float, rate
         N += len(t)
     if deviation > stamps.jitter:
         raise stamps.error(
-            f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step {length:g} s here, {1 / rate:g} s on average",
+            f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step {length:g} s here, {1 / rate:g} s on average{HINT}",
             place,
         )
 
