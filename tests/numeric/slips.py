@@ -288,9 +288,199 @@ def _masses(case: Case, f: float) -> Case:
     return replace(case, robot=f"{head}values: {{{scaled}")
 
 
+# --- a four-axis palletiser, simulated ------------------------------------------------------------------------------------------------------------
+
+PALLETISER = """\
+symgen: 1
+name: palletiser
+gravity: [0, 0, -g]
+constants: {D2: 0.3, D3: 1.0, D4: 1.2, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0,     d: 0,  theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: -pi/2, d: D2, theta: q2, r: 0}
+  3: {ant: 2, sigma: 0, alpha: 0,     d: D3, theta: q3, r: 0}
+  4: {ant: 3, sigma: 0, alpha: pi/2,  d: D4, theta: q4, r: 0}
+elements:
+  Ia:     {kind: inertia, along: all}
+  FV:     {kind: viscous, along: all}
+  FS:     {kind: coulomb, along: all}
+  OFFSET: {kind: offset,  along: all}
+drives:                            # the motor of joint 3 stands at the base: its angle is that of the forearm, q2 + q3
+  ratio: [[150, 0, 0, 0], [0, 180, 0, 0], [0, 160, 160, 0], [0, 0, 0, 80]]
+limits: {q: [[-3, 3], [-2, 2], [-2.5, 2.5], [-6, 6]], qd: [3, 3, 3, 6]}
+"""
+BODIES = {1: (180, 0.1, 0.0, -0.1), 2: (90, 0.45, 0.02, 0.1), 3: (110, 0.35, 0.05, 0.0), 4: (60, 0.05, 0.02, -0.2)}  # kg, m
+
+
+def palletiser(seed: int = 0, noise: float = 0.02) -> Case:
+    """Motor angles and torques: sums of sinusoids, dry friction that falls with speed (which the model lacks), noise, encoder steps."""
+    rng = np.random.default_rng([41, seed])
+    robot = parse_robot(PALLETISER.encode(), "palletiser.yaml")
+    model = symgen.model(robot)
+    rate, T = 500.0, 12.0
+    t = np.arange(int(rate * T)) / rate
+    size = np.array([1.2, 0.6, 0.7, 2.0])
+    q, qd, qdd = np.zeros((3, len(t), 4))
+    for j in range(4):
+        for k in rng.choice(np.arange(1, 11), 5, replace=False):
+            a, phase, w = size[j] * rng.uniform(0.2, 0.6) / np.sqrt(k), rng.uniform(0, 6.28), 2 * np.pi * k / T
+            q[:, j] += a * np.sin(w * t + phase)
+            qd[:, j] += a * w * np.cos(w * t + phase)
+            qdd[:, j] -= a * w**2 * np.sin(w * t + phase)
+    q += [0.0, -0.6, 0.8, 0.0]
+    chi = dict.fromkeys(robot.parameters, 0.0)
+    for j, (m, x, y, z) in BODIES.items():
+        P = np.array([x, y, z])
+        J = m * (P @ P * np.eye(3) - np.outer(P, P)) + m * 0.04 * np.diag([1.0, 1.3, 1.1])
+        chi |= {
+            f"{name}{j}": J[i, k] for name, i, k in (("XX", 0, 0), ("XY", 0, 1), ("XZ", 0, 2), ("YY", 1, 1), ("YZ", 1, 2), ("ZZ", 2, 2))
+        }
+        chi |= {f"M{axis}{j}": m * v for axis, v in zip("XYZ", P, strict=True)} | {f"M{j}": float(m)}
+        chi |= {f"Ia{j}": 40.0 / j, f"FV{j}": 60.0 / j, f"FS{j}": 80.0 / j, f"OFFSET{j}": 2.0}
+    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(chi))
+    tau += 15 * np.sign(qd) * np.exp(-np.abs(qd) / 0.1) + noise * tau.std(axis=0) * rng.standard_normal(tau.shape)
+    drives = Drives.from_mapping(model.DRIVES)
+    motor = drives.motor_position(q)
+    return Case(
+        PALLETISER,
+        t,
+        np.round(motor / 1e-4) * 1e-4,
+        drives.motor_command(tau),
+        "motor",
+        "motor",
+        study={"signals": {"lowpass": {"cutoff": 20}}},
+    )
+
+
+def _coupled(case: Case) -> Case:
+    return case.text("[0, 160, 160, 0]", "[0, 0, 160, 0]")
+
+
+SIMULATED = (
+    Slip(1, "ratio of joint 2 negative", r"joint 2 counts|(torque|position) of joint 2 has", lambda c: c.text("180", "-180")),
+    Slip(2, "motor angles in degrees", r"degrees|rad are read|record\.units|side", lambda c: replace(c, q=np.rad2deg(c.q))),
+    Slip(3, "position columns 1 and 4 exchanged", r"position columns of joints 1 and 4", lambda c: replace(c, q=columns(3, 1, 2, 0)(c.q))),
+    Slip(4, "torque columns 2 and 3 exchanged", r"torque columns of joints 2 and 3", lambda c: replace(c, tau=columns(0, 2, 1, 3)(c.tau))),
+    Slip(5, "joints in reverse order", r"reverse order", lambda c: replace(c, q=c.q[:, ::-1], tau=c.tau[:, ::-1])),
+    Slip(6, "gravity with the wrong sign", r"gravity (has|points)|it is \(.*-1.00\)", lambda c: c.text("[0, 0, -g]", "[0, 0, g]")),
+    Slip(7, "gravity along y", r"gravity (has|points)|it is \(.*-1.00\)", lambda c: c.text("[0, 0, -g]", "[0, -g, 0]")),
+    Slip(8, "alpha of frame 2 with the wrong sign", r"alpha of frame 2", lambda c: c.text("alpha: -pi/2", "alpha: pi/2")),
+    Slip(9, "coupling of joints 2 and 3 forgotten", r"coupling of joints 2 and 3", _coupled),
+    Slip(12, "rate 2000 for 500", r"sampling rate is 1/4", lambda c: replace(c, rate=4.0)),
+    Slip(13, "motor torques taken for joint torques", r"gear|torque_side", lambda c: replace(c, torque_side="joint")),
+    Slip(
+        15,
+        "torque of joint 2 times 1.41",
+        r"torque of joint 2 is to be multiplied by 0\.[67]",
+        lambda c: replace(c, tau=c.tau * [1, 1.41, 1, 1]),
+    ),
+    Slip(
+        18, "torque 20 ms late", r"Torques are late", lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 10, axis=0), c.tau[:-10]]))
+    ),
+    Slip(21, "D3 = 1.4 for 1.0", r"d of frame 3 is", lambda c: c.text("D3: 1.0", "D3: 1.4")),
+    Slip(
+        24, "theta of frame 3 wrong by 90 degrees", r"theta of joint 3|zero of joint 3", lambda c: c.text("theta: q3", "theta: q3 + pi/2")
+    ),
+    Slip(26, "zero of joint 2 off by 15 degrees", r"zero of joint 2", lambda c: c.text("theta: q2", "theta: q2 + pi/12")),
+    Slip(31, "all torques negative", r"torques have the wrong sign", lambda c: replace(c, tau=-c.tau)),
+    Slip(34, "torque 8 ms early", r"Torques are early", lambda c: replace(c, tau=np.vstack([c.tau[4:], np.repeat(c.tau[-1:], 4, axis=0)]))),
+    Slip(41, "D4 in mm", r"frame 4", lambda c: c.text("D4: 1.2", "D4: 1200.0")),
+    Slip(
+        42,
+        "motor angles taken for joint angles",
+        r"positions of the motors|record\.side|side of the positions",
+        lambda c: replace(c, side="joint"),
+    ),
+)
+
+
+# --- Staubli TX40, measured -----------------------------------------------------------------------------------------------------------------------
+
+
+def tx40(folder: Path, *, values: bool = False) -> Case:
+    import gzip
+
+    def column(file: str) -> Array:
+        with gzip.open(folder / f"{file}.csv.gz", "rt") as stream:
+            return np.loadtxt(stream, delimiter=",", skiprows=1)
+
+    text = (Path(symgen.__file__).parent / "description" / "robots" / "tx40.yaml").read_text()
+    head, _, tail = text.partition("values:")
+    q, tau = column("pos_read_data"), column("curr_data")
+    return Case(
+        robot=head + ("values:" + tail if values else ""),
+        t=np.arange(len(q)) / 5000,
+        q=q,
+        tau=tau,
+        side="motor",
+        torque_side="motor",
+        study={"rows": {"window": [0, 7.5]}},
+        values=values,
+    )
+
+
+TX40 = (
+    Slip(1, "ratio of joint 3 negative", r"joint 3 counts|torque of joint 3 has", lambda c: c.text("[0, 0, 45, 0", "[0, 0, -45, 0")),
+    Slip(
+        3,
+        "position columns 2 and 3 exchanged",
+        r"position columns of joints 2 and 3",
+        lambda c: replace(c, q=columns(0, 2, 1, 3, 4, 5)(c.q)),
+    ),
+    Slip(
+        4,
+        "torque columns 4 and 5 exchanged",
+        r"torque columns of joints 4 and 5",
+        lambda c: replace(c, tau=columns(0, 1, 2, 4, 3, 5)(c.tau)),
+    ),
+    Slip(6, "gravity with the wrong sign", r"gravity (has|points)|it is \(.*-1.00\)", lambda c: c.text("[0, 0, -g]", "[0, 0, g]")),
+    Slip(
+        8,
+        "alpha of frame 4 with the wrong sign",
+        r"alpha of frame 4",
+        lambda c: c.text("ant: 3, sigma: 0, alpha: pi/2", "ant: 3, sigma: 0, alpha: -pi/2"),
+    ),
+    Slip(
+        9,
+        "alpha of frame 2 with the wrong sign",
+        r"alpha of frame 2",
+        lambda c: c.text("ant: 1, sigma: 0, alpha: -pi/2", "ant: 1, sigma: 0, alpha: pi/2"),
+    ),
+    Slip(
+        15, "torque of joint 2 times 1.41", r"torque of joint 2 is to be multiplied", lambda c: replace(c, tau=c.tau * factor(1, 1.41, 6))
+    ),
+    Slip(16, "ratio of joint 4 positive", r"joint 4 counts|torque of joint 4", lambda c: c.text("-48", "48")),
+    Slip(
+        18, "torque 20 ms late", r"Torques are late", lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 110, axis=0), c.tau[:-110]]))
+    ),
+    Slip(23, "RL4 in mm", r"frame 4", lambda c: c.text("RL4: 0.225", "RL4: 225.0")),
+    Slip(
+        24,
+        "offset of joint 3 forgotten",
+        r"theta of joint 3|zero of joint 3|offset",
+        lambda c: c.text("offset: [0, -pi/2, pi/2", "offset: [0, -pi/2, 0"),
+    ),
+    Slip(
+        43,
+        "coupling of the wrist forgotten",
+        r"coupling of joints 5 and 6",
+        lambda c: c.text("[0, 0, 0, 0, 32, 32]", "[0, 0, 0, 0, 0, 32]"),
+    ),
+    Slip(
+        44,
+        "offsets of the drives with the wrong sign",
+        r"offset|theta",
+        lambda c: c.text("offset: [0, -pi/2, pi/2", "offset: [0, pi/2, -pi/2"),
+    ),
+)
+
+
 def campaigns(folder: Path) -> list[tuple[str, Case, tuple[Slip, ...]]]:
     """Name, right study and slips."""
     return [
         ("kr300 values", kr300(folder / "kr300", values=True), KR300),
         ("kr300 plain", kr300(folder / "kr300"), KR300),
+        ("palletiser", palletiser(), SIMULATED),
+        ("tx40 plain", tx40(folder / "tx40"), TX40),
+        ("tx40 values", tx40(folder / "tx40", values=True), TX40),
     ]

@@ -14,6 +14,7 @@ from runtime.identification.checklist import Check, State
 from runtime.identification.plausibility.samples import Samples
 from runtime.model.generated import GeneratedModel, joint_units
 from runtime.model.inertia import PhysicalModel
+from runtime.records.record import Record
 
 Array = np.ndarray
 
@@ -25,6 +26,8 @@ METRES = (5.0, 50.0)
 SPEEDS = {"rad": (15.0, 60.0), "m": (5.0, 50.0)}
 """Largest speed, rad/s and m/s."""
 ACCELERATIONS = {"rad": (300.0, 3000.0), "m": (100.0, 1000.0)}
+RATES = (5.0, 1e5)
+"""Sampling rates of logs, Hz."""
 SLOW = 0.005
 """Largest speed of the fastest joint, rad/s or m/s, below which nothing moves."""
 REST = 0.1
@@ -59,6 +62,17 @@ def _limits(model: GeneratedModel, key: str) -> Array | None:
 
 def _per_joint(names: Sequence[int], values: Array, unit: Sequence[str], chosen: Array) -> str:
     return ", ".join(f"joint {names[j]} {values[j]:.3g} {unit[j]}" for j in np.flatnonzero(chosen)[:4])
+
+
+def times(records: Sequence[Record]) -> Check:
+    """Sampling rate and duration of the records."""
+    question, limit = "Are the times those of a log?", f"{RATES[0]:g} Hz to {RATES[1] / 1e3:g} kHz"
+    record = min(records, key=lambda one: one.rate)
+    duration = float(record.t[-1] - record.t[0])
+    text = f"{record.rate:.4g} Hz over {duration:.4g} s"
+    wrong = any(not RATES[0] <= one.rate <= RATES[1] for one in records)
+    remedy = "look at the unit of the time column (record.units.t: ms, us) and at record.rate"
+    return Check(question, "no" if wrong else "good", text, limit, remedy)
 
 
 def positions(model: GeneratedModel, samples: Samples) -> Check:

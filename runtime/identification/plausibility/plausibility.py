@@ -16,7 +16,7 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.identification.checklist import WORST, Check, State
-from runtime.identification.plausibility.before import REST, before_checks
+from runtime.identification.plausibility.before import REST, before_checks, times
 from runtime.identification.plausibility.continuous import searched
 from runtime.identification.plausibility.delay import CERTAIN, LONGEST, Delay, delay
 from runtime.identification.plausibility.gravity import Gravity, gravity_direction
@@ -139,12 +139,16 @@ def plausibility(
             (Check("Do record and robot file suit each other?", "open", "Not asked: the record is read by blocks", "", "set stream: off"),)
         )
     progress("plausibility of the record")
-    samples = samples_of(whole, study)
+    checks = [times(whole)]
+    try:
+        samples = samples_of(whole, study)
+    except InputError as e:
+        return Plausibility((*checks, Check("Do record and robot file suit each other?", "open", f"Not asked: {e.message}")))
     try:
         physical = physical_model(model)
     except InputError:
         physical = None
-    checks = [*before_checks(model, samples, physical), rest(model, whole, study, samples)]
+    checks += [*before_checks(model, samples, physical), rest(model, whole, study, samples)]
     rows = samples.moving().sum(axis=0)
     enough = int(rows.sum()) > 2 * len(model.BASE_PARAMETERS) and int(rows.min()) > FEWEST
     if physical is None or not enough:

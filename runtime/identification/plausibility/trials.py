@@ -21,7 +21,7 @@ Array = np.ndarray
 
 DECISIVE = 20.0
 """Gain of an alternative, nats, from which it is named."""
-ALIKE = 0.25
+ALIKE = 0.4
 """Alternatives within this share of the best gain are named with it."""
 NAMED = 6
 """Alternatives named at most."""
@@ -166,7 +166,7 @@ def tried(
             free = least_squares(grams, problem.N)
             bounds.append((free.score - volume, volume, alternative, grams, free.sigma))
     bounds.sort(key=lambda item: item[0])
-    quick = []
+    quick: list[tuple[float, float, float, Alternative, Grams, Array]] = []
     best = given.score - DECISIVE
     for bound, volume, alternative, grams, sigma in bounds:
         if len(quick) < LOOKED_AT and bound < best + ALIKE * (given.score - best):
