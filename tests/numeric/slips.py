@@ -164,7 +164,7 @@ def _kr300_classic(case: Case) -> Case:
             j = int(m[1])
             lines[i] = re.sub(r"alpha: *[^,]+, *d: *[^,]+,", f"alpha: {rows[j][0]}, d: {rows[j][1]},", line)
             assert lines[i] != line or rows[j] == old[j]
-    return replace(case, robot="\n".join(lines))
+    return replace(case, robot="\n".join(lines).replace("[0, 0, -g]", "[0, 0, g]"))  # its z0 points down
 
 
 def _constants(case: Case, torque_constant: str) -> Case:
@@ -244,7 +244,7 @@ KR300 = (
     Slip(
         27,
         "torque of joint 5 in kp m",
-        r"torque of joint 5 is to be multiplied by (8|9|10|11)",
+        r"torque of joint 5 (is to be multiplied|0\.)",
         lambda c: replace(c, tau=c.tau * factor(4, 1 / 9.81, 6)),
     ),
     Slip(28, "position columns moved by one", r"position columns are moved by one", lambda c: replace(c, q=np.roll(c.q, 1, axis=1))),
@@ -277,7 +277,12 @@ KR300 = (
     Slip(
         39, "theta of frame 2 with the wrong sign of pi/2", r"theta of joint 2|alpha of frame 2", lambda c: c.text("q2 - pi/2", "q2 + pi/2")
     ),
-    Slip(40, "another robot's values: masses of a third", r"times that of the values", lambda c: _masses(c, 1 / 3) if c.values else None),
+    Slip(
+        40,
+        "another robot's values: masses of a third",
+        r"values are those of another robot",
+        lambda c: _masses(c, 1 / 3) if c.values else None,
+    ),
 )  # 22 is equivalent, and so is 40 without values
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from runtime.identification.plausibility.alternatives import Alternative
-from runtime.identification.plausibility.fits import MU, Grams, physical_fit, quick_fit, solved
+from runtime.identification.plausibility.fits import MU, Grams, least_squares, physical_fit, quick_fit, solved
 from runtime.identification.plausibility.trials import DECISIVE, Problem, Trial, moving
 from runtime.model.generated import joint_units
 
@@ -83,7 +83,7 @@ def _factors(problem: Problem) -> Iterator[Quantity]:
             remedy = f"look at ratio, torque constant and unit of joint {joint} ({_guess(factor)})"
             return replace(plain, cause=cause, remedy=remedy, kind="factor", T=np.diag(np.where(np.arange(n) == j, factor, 1.0)))
 
-        yield Quantity("factor", change, 2.0)
+        yield Quantity("factor", change, 2.6)
 
 
 def _guess(factor: float) -> str:
@@ -192,19 +192,17 @@ def searched(problem: Problem) -> list[Trial]:
 
 
 def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
-    """The best value by a coarse grid and golden section, each fit from the one before."""
-    chi = problem.given.X
+    """The best value by a coarse grid and golden section."""
     scores: dict[float, float] = {}
 
     def score(xi: float) -> float:
-        nonlocal chi
         alternative = quantity.change(xi)
         grams = problem.grams(alternative)
         if grams is None:
             return np.inf
         volume = problem.N * float(np.linalg.slogdet(alternative.T)[1])
-        fit = quick_fit(problem.standard(grams), problem.barrier, problem.N, problem.free.sigma, chi)
-        chi, scores[xi] = fit.X, fit.score - volume
+        fit = quick_fit(problem.standard(grams), problem.barrier, problem.N, least_squares(grams, problem.N).sigma)
+        scores[xi] = fit.score - volume
         return scores[xi]
 
     near = float(np.clip(step.xi, -quantity.span, quantity.span))
@@ -221,6 +219,6 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
     if grams is None:
         return None
     volume = problem.N * float(np.linalg.slogdet(alternative.T)[1])
-    fit = physical_fit(problem.standard(grams), problem.barrier, problem.N, problem.free.sigma, chi)
+    fit = physical_fit(problem.standard(grams), problem.barrier, problem.N, least_squares(grams, problem.N).sigma)
     gain = problem.given.score - fit.score + volume - 0.5 * np.log(problem.N)  # one parameter more
     return Trial(alternative, -np.inf, fit, float(gain))

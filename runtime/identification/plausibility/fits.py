@@ -300,17 +300,19 @@ def _interior(B: Array) -> Array:
     return np.asarray(np.linalg.lstsq(k.T, np.eye(B.shape[1]).ravel(), rcond=None)[0])
 
 
-def quick_fit(grams: Grams, barrier: Barrier, N: float, sigma: Array, chi: Array) -> Fit:
-    """About what `physical_fit` gives, from a neighbour chi, to a few nats above it."""
-    chi = barrier.minimum(*grams.weighted(sigma), chi, MU[1:2], 1.0)
+def quick_fit(grams: Grams, barrier: Barrier, N: float, sigma: Array) -> Fit:
+    """About what `physical_fit` gives, to a few nats above it."""
+    chi = barrier.minimum(*grams.weighted(sigma), barrier.start, MU[:2], 1.0)
     return fit_of(grams, chi, N, barrier.penalty(chi))
 
 
-def physical_fit(grams: Grams, barrier: Barrier, N: float, sigma: Array, chi: Array | None = None, rounds: int = 3) -> Fit:
-    """Fit of a physical robot, near the values where the barrier holds them. sigma : first weights.   chi : where to start, interior."""
-    warm = chi is not None
-    chi = barrier.start if chi is None else chi
+def physical_fit(grams: Grams, barrier: Barrier, N: float, sigma: Array, rounds: int = 3) -> Fit:
+    """Fit of a physical robot, near the values where the barrier holds them. sigma : first weights.
+
+    It starts in the middle of the cone: from a neighbour, near the boundary, Newton steps are short.
+    """
+    chi = barrier.start
     for k in range(rounds):
-        chi = barrier.minimum(*grams.weighted(sigma), chi, MU[-1:] if k else MU[1:] if warm else MU)
+        chi = barrier.minimum(*grams.weighted(sigma), chi, MU[-1:] if k else MU)
         sigma = grams.sigma(chi)
     return fit_of(grams, chi, N, barrier.penalty(chi))

@@ -69,7 +69,7 @@ def gravity_direction(problem: Problem) -> Gravity | None:
 
     def fit(u: Array) -> Fit:
         grams = Grams.of(rest + size * np.tensordot(u, by_axis, axes=1), Y, mask)
-        return physical_fit(grams, problem.barrier, problem.N, least_squares(grams, problem.N).sigma, problem.given.X, 2)
+        return physical_fit(grams, problem.barrier, problem.N, least_squares(grams, problem.N).sigma, 2)
 
     starts = [given / size, *(sign * np.eye(3)[a] for a in range(3) for sign in (1.0, -1.0))]
     fits = [fit(u) for u in starts]

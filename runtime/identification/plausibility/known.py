@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from runtime.identification.plausibility.trials import Problem
+from runtime.model.generated import elements_of
 from runtime.model.inertia import INERTIAL
 
 Array = np.ndarray
@@ -81,13 +82,15 @@ def known_values(problem: Problem) -> KnownValues | None:
     gravity = problem.model.regressor(s.q, at_rest, at_rest) @ X
     whole = problem.model.regressor(s.q, s.qd, s.qdd) @ X
     Y, mask = s.tau - s.known, s.moving()
+    columns = problem.model.regressor(s.q, s.qd, s.qdd) @ physical.K
+    beside = [k for k, name in enumerate(physical.standard) if elements_of(problem.model).get(name, ("inertia",))[0] != "inertia"]
     ratios, errors = np.full((s.n, 2), np.nan), np.full(s.n, np.nan)
     for j in range(s.n):
         rows = mask[:, j]
         y = Y[rows, j]
         if len(y) < 20:
             continue
-        friction = np.column_stack([s.qd[rows, j], np.sign(s.qd[rows, j]), np.ones(len(y))])
+        friction = columns[rows][:, j, beside]
         parts = np.column_stack([gravity[rows, j], (whole - gravity)[rows, j]])
         left = parts - friction @ np.linalg.lstsq(friction, parts, rcond=None)[0]
         rest = y - friction @ np.linalg.lstsq(friction, y, rcond=None)[0]

@@ -39,6 +39,8 @@ DENSITY = (0.3, 2e4)
 """Mass of a robot over the cube of its reach, kg/m^3: outside, the torques have another unit or side."""
 FEWEST = 20
 """Rows of a joint that moves, below which nothing is judged but the record itself."""
+RATE = 20.0
+"""Gain, nats, that another sampling rate needs beyond that of other alternatives."""
 LATE = 0.004
 """Delay, s, from which it is told."""
 TILT = 15.0
@@ -166,7 +168,7 @@ def plausibility(
         progress("what would explain the record better")
         sides = study.record[0].sides if study.record else ("joint", "joint")
         trials = _ranked([*tried(problem, sides), *searched(problem)])
-    named = decisive(trials)
+    named = decisive(trials, problem.given)
     checks += [] if gravity is None else [direction(gravity, named)]
     checks += [better(problem, named, tried=bool(trials))] if trials else []
     return Plausibility(
@@ -175,7 +177,8 @@ def plausibility(
 
 
 def _ranked(trials: Sequence[Trial]) -> list[Trial]:
-    """The best first; of the sampling rates one alone."""
+    """The best first; of the sampling rates one alone, which has to gain RATE more: a slower motion gives the parameters more room."""
+    trials = [replace(t, gain=t.gain - RATE) if t.alternative.kind == "rate" else t for t in trials]
     ordered = sorted(trials, key=lambda trial: -trial.gain)
     kept: list[Trial] = []
     for trial in ordered:
@@ -254,7 +257,7 @@ def values(known: KnownValues) -> Check:
     question = "Do the values of the robot file agree with the record?"
     limit = "gravity and inertia torques a third to three times those of the values"
     remedy = (
-        "look at ratio, torque constant and sign of that joint, at the load, and at what the model leaves out: a counterbalance or a cable is "
+        "look at ratio, torque constant, unit and sign of that joint, at the load, and at what the model leaves out: a counterbalance or a cable is "
         "subtracted as record.columns.tau_known; or the values are those of another robot"
     )
     ratios = [x for x in (*known.gravity, *known.inertia) if np.isfinite(x)]

@@ -20,12 +20,14 @@ from runtime.model.inertia import PhysicalModel, physical_model
 Array = np.ndarray
 
 DECISIVE = 20.0
-"""Gain of an alternative, nats, from which it is named."""
+"""Gain of an alternative, nats, from which it is named, ..."""
+VISIBLE = 1.2
+"""... where it divides the error of a joint by this at least, or the distance from the values of the robot file shrinks as much as DECISIVE."""
 ALIKE = 0.4
 """Alternatives within this share of the best gain are named with it."""
 NAMED = 6
 """Alternatives named at most."""
-LOOKED_AT = 48
+LOOKED_AT = 80
 """Alternatives fitted under the conditions of a physical robot, those of the best least squares."""
 REFINED = 10
 """Alternatives fitted to the end."""
@@ -171,20 +173,23 @@ def tried(
     for bound, volume, alternative, grams, sigma in bounds:
         if len(quick) < LOOKED_AT and bound < best + ALIKE * (given.score - best):
             standard = problem.standard(grams)
-            score = quick_fit(standard, problem.barrier, problem.N, sigma, given.X).score - volume
+            score = quick_fit(standard, problem.barrier, problem.N, sigma).score - volume
             best = min(best, score)
             quick.append((score, bound, volume, alternative, standard, sigma))
     quick.sort(key=lambda item: item[0])
     trials = {id(a): Trial(a, bound, None, -np.inf) for bound, _, a, *_ in bounds}
     for _, bound, volume, alternative, standard, sigma in quick[:REFINED]:
-        fit = physical_fit(standard, problem.barrier, problem.N, sigma, given.X)
+        fit = physical_fit(standard, problem.barrier, problem.N, sigma)
         trials[id(alternative)] = Trial(alternative, bound, fit, given.score - fit.score + volume)
     return sorted(trials.values(), key=lambda trial: -trial.gain)
 
 
-def decisive(trials: Sequence[Trial]) -> list[Trial]:
-    """Those that explain the record decisively better: the best, and those like it."""
-    if not trials or trials[0].gain < DECISIVE:
-        return []
-    least = max((1 - ALIKE) * trials[0].gain, DECISIVE)
-    return [trial for trial in trials if trial.gain >= least][:NAMED]
+def decisive(trials: Sequence[Trial], given: Fit) -> list[Trial]:
+    """Those that explain the record decisively better than the study as given: the best, and those like it."""
+    better = [trial for trial in trials if trial.fit is not None and trial.gain >= DECISIVE and _visible(trial.fit, given)]
+    return [trial for trial in better if trial.gain >= (1 - ALIKE) * better[0].gain][:NAMED]
+
+
+def _visible(fit: Fit, given: Fit) -> bool:
+    ratio = given.errors / np.maximum(fit.errors, 0.1)
+    return bool((ratio > VISIBLE).any()) or given.penalty - fit.penalty > DECISIVE
