@@ -134,7 +134,7 @@ def _measured(loop: ClosedLoop, observation: Observation, output: str) -> Array:
 def _simulated(loop: ClosedLoop, observation: Observation, X: Array, output: str) -> Array:
     """y_s of the parameters X of the columns, shape (r,)."""
     runs = loop.run(full(observation.names, X, loop.model.BASE_PARAMETERS))
-    return loop.outputs([run.q if output == "position" else run.tau for run in runs], observation)
+    return loop.outputs([run.q for run in runs] if output == "position" else loop.torques(runs), observation)
 
 
 def _slope(loop: ClosedLoop, observation: Observation, X: Array, output: str) -> Array:

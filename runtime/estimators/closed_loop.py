@@ -26,13 +26,15 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from runtime.errors import InputError, SettingsError
+from runtime.estimators.law_check import LawFit, law_fits, law_text
 from runtime.model.generated import GeneratedModel
-from runtime.motion.reference import Reference, reference_of
+from runtime.motion.reference import Reference, of_record, reference_of, require_rate
 from runtime.observation.filters import States, decimated, filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states
 from runtime.observation.rows import Selection, select_rows
 from runtime.observation.states import certain_rows, observed_states
 from runtime.observation.system import LoopRows, Observation, stack
+from runtime.progress import at
 from runtime.records.record import Record
 from runtime.settings.controller import Controller
 from runtime.settings.study import Study
@@ -73,36 +75,74 @@ class LoopSimulator(Protocol):
     law: Any
     friction: Any
 
-    def run(self, X: Array, reference: Reference, *, g: Array | float, start: Array, ideal: bool) -> SimulatedRun:
+    def run(
+        self,
+        X: Array,
+        reference: Reference,
+        *,
+        g: Array | float,
+        start: Array,
+        ideal: bool,
+        disturbance: Array | None,
+        feedforward: Array | None,
+    ) -> SimulatedRun:
         """One run; raises InputError where it cannot be made."""
 
-    def sensitivity(self, X: Array, reference: Reference, *, start: Array) -> tuple[SimulatedRun, Any]:
+    def sensitivity(
+        self, X: Array, reference: Reference, *, start: Array, disturbance: Array | None, feedforward: Array | None
+    ) -> tuple[SimulatedRun, Any]:
         """An ideal run, and its derivatives by X, arrays q and tau of shape (N, n, b)."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopPart:
-    """One record: what the controller followed, at its rate, the rows used, and Y before rows are left out, shape (n, K)."""
+    """One record.
+
+    Attributes
+    ----------
+    record : Record
+    reference : Reference
+        What the controller followed, at its rate; T ticks.
+    selection : Selection
+        Rows used.
+    torque : ndarray, shape (n, K), N m or N
+        Y before rows are left out.
+    feedforward, disturbance : ndarray, shape (T, n), N m or N, or None
+        Recorded feed-forward torque, and the known torque with the opposite sign: what acts on the arm beside drives and model.
+    """
 
     record: Record
     reference: Reference
     selection: Selection
     torque: Array
+    feedforward: Array | None = None
+    disturbance: Array | None = None
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What a simulation of this record takes beside parameters and reference."""
+        return {"start": self.record.q[0], "disturbance": self.disturbance, "feedforward": self.feedforward}
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """The records with their loop. `assumption`: what was assumed about the reference; empty where it is known."""
+    """The records with their loop. `assumption`: what was assumed about the reference; empty where it is known. `law`: what the control law explains of them."""
 
     model: GeneratedModel
     study: Study
     simulator: LoopSimulator
     parts: tuple[LoopPart, ...]
     assumption: str = ""
+    law: tuple[LawFit, ...] = ()
 
     def run(self, X: Array, g: Array | float = 1.0) -> list[SimulatedRun]:
         """One simulation per record with all base parameters X (b,), from the measured position at its start, at rest."""
-        return [self.simulator.run(X, part.reference, g=g, start=part.record.q[0], ideal=True) for part in self.parts]
+        return [self.simulator.run(X, part.reference, g=g, ideal=True, **part.given) for part in self.parts]
+
+    def torques(self, runs: Sequence[SimulatedRun]) -> list[Array]:
+        """Torque of the drives in each run, (N, n), without the known torque of its record: what is beside `Record.tau`."""
+        pairs = zip(runs, (part.record.tau_known for part in self.parts), strict=True)
+        return [run.tau if known is None else run.tau[: len(known)] - known for run, known in pairs]
 
     def measured(self) -> Observation:
         """Y = W X + rho of the measured positions on the rows of the loop, which it carries along."""
@@ -127,7 +167,7 @@ class ClosedLoop:
 
     def sensitivity(self, X: Array) -> list[tuple[SimulatedRun, Any]]:
         """One simulation per record, with its derivatives by X."""
-        return [self.simulator.sensitivity(X, part.reference, start=part.record.q[0]) for part in self.parts]
+        return [self.simulator.sensitivity(X, part.reference, **part.given) for part in self.parts]
 
     def outputs(self, signals: Sequence[Array], observation: Observation) -> Array:
         """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of `observation`: shape (r,) or (r, c)."""
@@ -185,10 +225,16 @@ def closed_loop(
     controller = simulator.controller
     parts = []
     for k, record in enumerate(records):
+        require_rate(record, controller)
         rate = controller.rate / controller.record_every
-        if abs(record.rate / rate - 1) > 1e-3:
-            raise SettingsError(f"{record.file} at {record.rate:g} Hz, recorded every {controller.record_every} ticks of {controller.rate:g} Hz; expected the same",
-                                path=("controller", "rate"))  # fmt: skip
+        if record.known and record.tau_known is None:
+            raise InputError(
+                "its known torques are lost, since it was changed after they were subtracted; make it anew with tau_known", file=record.file
+            )
+        if controller.feedforward == "record" and record.tau_ff is None:
+            raise SettingsError(
+                f"{record.file} holds no feed-forward torque; name its columns in record.columns.tau_ff", path=("controller", "feedforward")
+            )
         followed = _reference(model, records, k, controller, study, reference)
         every = controller.record_every
         if len(followed) // every + (len(followed) % every > 0) < len(record):
@@ -200,8 +246,21 @@ def closed_loop(
         selection = select_rows(
             record, wanted, study.signals, study.rows, keep=_usable(simulator, record, keep[k] if k < len(keep) else None)
         )
-        parts.append(LoopPart(record, followed, selection, decimated_torque(record.tau, selection)))
-    return ClosedLoop(model, study, simulator, tuple(parts), ASSUMED if reference == "measured" else "")
+        known = None if record.tau_known is None else -_at_ticks(record.tau_known, every, len(followed))
+        fed = _at_ticks(record.tau_ff, every, len(followed)) if controller.feedforward == "record" and record.tau_ff is not None else None
+        parts.append(LoopPart(record, followed, selection, decimated_torque(record.tau, selection), fed, known))
+    if reference == "measured":
+        return ClosedLoop(model, study, simulator, tuple(parts), ASSUMED)
+    references, selections = [part.reference for part in parts], [part.selection for part in parts]
+    fits = law_fits(simulator.law, records, references, selections, controller, model.JOINTS)
+    at(law_text(fits))
+    return ClosedLoop(model, study, simulator, tuple(parts), "", fits)
+
+
+def _at_ticks(x: Array, every: int, ticks: int) -> Array:
+    """Samples (N, n) at the ticks of the controller, (T, n), by straight lines; the last one held."""
+    places = np.arange(ticks) / every
+    return np.column_stack([np.interp(places, np.arange(len(x)), column) for column in x.T])
 
 
 def _reference(model: GeneratedModel, records: Sequence[Record], k: int, controller: Controller, study: Study, reference: str) -> Reference:
@@ -214,8 +273,8 @@ def _reference(model: GeneratedModel, records: Sequence[Record], k: int, control
         ticks = np.arange((len(record) - 1) * controller.record_every + 1) / controller.record_every
         each = [np.column_stack([np.interp(ticks, np.arange(len(x)), column) for column in x.T]) for x in (states.q, states.qd, states.qdd)]
         return Reference(controller.rate, *each)
-    if record.q_r is not None and controller.record_every == 1:
-        return Reference.sampled(record.q_r, controller.rate)
+    if record.q_r is not None:
+        return of_record(record, controller)
     given = controller.reference
     if all(getattr(given, name) is None for name in ("file", "motion", "points", "record")):
         raise SettingsError(

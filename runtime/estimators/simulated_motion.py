@@ -19,6 +19,7 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.estimators.closed_loop import ClosedLoop, SimulatedRun
 from runtime.estimators.estimate import Status
+from runtime.estimators.law_check import law_text
 from runtime.observation.system import Observation
 
 Array = np.ndarray
@@ -75,7 +76,7 @@ def _compared(loop: ClosedLoop, observation: Observation, runs: Sequence[Simulat
     error = np.concatenate([run.q[: len(x)] - x for run, x in zip(runs, q, strict=True)])
     moved = np.concatenate([x - x.mean(axis=0) for x in q])
     lag = np.concatenate([part.reference.q[::every][: len(x)] - x for part, x in zip(loop.parts, q, strict=True)])
-    tau = loop.outputs([run.tau for run in runs], observation)
+    tau = loop.outputs(loop.torques(runs), observation)
     rms, size, tracking = (np.sqrt(np.mean(x**2, axis=0)) for x in (error, moved, lag))
     return tuple(
         JointMotion(
@@ -91,18 +92,20 @@ def _compared(loop: ClosedLoop, observation: Observation, runs: Sequence[Simulat
 
 def judged(loop: ClosedLoop, observation: Observation, X: Array) -> tuple[Status, str, Mapping[str, Any]]:
     """Status, message, and `motion` for the details of an Estimate with all base parameters X."""
+    law = law_text(loop.law) if loop.law else ""
+    details: dict[str, Any] = {"law": [vars(one) for one in loop.law]} if loop.law else {}
     try:
         motion = simulated_motion(loop, observation, X)
     except InputError as e:
-        return "simulation-apart", f"The loop cannot be simulated with these parameters: {e}.", {}
+        return "simulation-apart", f"The loop cannot be simulated with these parameters: {e}. {law}".strip(), details
     apart = [text for one in motion if (text := one.apart)]
-    details = {"motion": [vars(one) for one in motion]}
+    details |= {"motion": [vars(one) for one in motion]}
     if not apart:
-        return "ok", "", details
+        return "ok", law, details
     return (
         "simulation-apart",
         f"The simulation does not follow the record: {', '.join(apart)}. The controller, its gains, its delay, the reference or the parameters are not those of "
-        "the record; what was fitted says nothing about this robot.",
+        f"the record; what was fitted says nothing about this robot. {law}",
         details,
     )
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from runtime.errors import InputError, SettingsError
 from runtime.model.generated import GeneratedModel
@@ -63,6 +64,14 @@ class Reference:
         qd = derivative(q, rate)
         return cls(rate, q, qd, derivative(qd, rate))
 
+    def at_rate(self, every: int) -> Reference:
+        """The same motion `every` times as fast sampled, N samples become (N - 1) every + 1: q by cubic splines, whose derivatives are qd and qdd."""
+        if every == 1:
+            return self
+        ticks = np.arange((len(self) - 1) * every + 1) / (every * self.rate)
+        spline = CubicSpline(self.t, self.q, axis=0)
+        return Reference(self.rate * every, spline(ticks), spline(ticks, 1), spline(ticks, 2))
+
     @property
     def t(self) -> Array:
         """Instants, s, shape (N,)."""
@@ -97,7 +106,7 @@ def reference_of(
     if settings.file is not None:
         reference = read_reference(Path(folder or "") / settings.file, rate, n)
     elif settings.record is not None:
-        reference = _of_record(records, settings.record, rate)
+        reference = of_record(_named(records, settings.record), controller)
     elif settings.motion is not None:
         motion = motion_from_mapping(settings.motion)
         _check_length(motion.duration, rate, "motion")
@@ -138,17 +147,36 @@ def read_reference(path: Path, rate: float, n: int) -> Reference:
     return Reference(rate, plain.q, *table.read([names["qd"], names["qdd"]]))
 
 
-def _of_record(records: Sequence[Record], index: int, rate: float) -> Reference:
+def _named(records: Sequence[Record], index: int) -> Record:
     if not 0 <= index < len(records):
         raise SettingsError(f"record {index}; the study has {len(records)}", path=("controller", "reference", "record"))
-    record = records[index]
+    return records[index]
+
+
+def of_record(record: Record, controller: Controller) -> Reference:
+    """The recorded reference at the rate of the controller, by cubic splines where the record is slower.
+
+    SettingsError where the record holds none, or its rate is not that of every `record_every`-th tick.
+    """
+    where, every = ("controller", "reference", "record"), controller.record_every
     if record.q_r is None:
-        raise SettingsError(
-            f"{record.file} holds no reference; name its columns in record.columns.qr", path=("controller", "reference", "record")
-        )
-    if abs(record.rate / rate - 1) > RATE_TOLERANCE:
-        raise SettingsError(f"{record.file} runs at {record.rate:g} Hz, the controller at {rate:g} Hz", path=("controller", "rate"))
-    return Reference.sampled(record.q_r, rate)
+        raise SettingsError(f"{record.file} holds no reference; name its columns in record.columns.qr", path=where)
+    require_rate(record, controller)
+    return Reference.sampled(record.q_r, controller.rate / every).at_rate(every)
+
+
+def require_rate(record: Record, controller: Controller) -> None:
+    """SettingsError unless the record holds every `record_every`-th tick of the controller, with the setting that would make it so."""
+    rate, every = controller.rate, controller.record_every
+    if abs(record.rate * every / rate - 1) <= RATE_TOLERANCE:
+        return
+    ratio = rate / record.rate
+    told = f"{record.file} at {record.rate:g} Hz, of a controller at {rate:g} Hz that records every {every}. tick"
+    if round(ratio) >= 1 and abs(ratio / round(ratio) - 1) <= RATE_TOLERANCE:
+        raise SettingsError(f"{told}; set controller.record_every: {round(ratio)}", path=("controller", "record_every"))
+    raise SettingsError(
+        f"{told}; the rate of the controller is no multiple of that of the record: correct one of them", path=("controller", "rate")
+    )
 
 
 def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequence[int]) -> None:

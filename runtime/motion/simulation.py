@@ -255,7 +255,7 @@ class Simulator:
 
     def _feedforward(self, reference: Reference) -> Array:
         """Torque of the reference with the parameters of the robot file, (N, n), where the settings ask for it."""
-        if self.controller.feedforward == "none":
+        if self.controller.feedforward != "values":
             return np.zeros_like(reference.q)
         X = parameters_of(self.model, self.controller)
         return np.asarray(self.model.inverse_dynamics(reference.q, reference.qd, reference.qdd, X, **self.constants))

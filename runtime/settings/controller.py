@@ -170,7 +170,7 @@ class Controller(Settings):
     velocity : str
         qd_m as the difference of two positions, or averaged, (q_k - q_(k-2))/2T.
     feedforward : str
-        values adds the torque of the reference with the parameters of the robot file.
+        values adds the torque of the reference with the parameters of the robot file; record adds the recorded one, `record.columns.tau_ff`.
     encoder : Encoder
         Measurement of the positions.
     torque : Torque
@@ -197,7 +197,7 @@ class Controller(Settings):
     rate: Positive = 1000.0
     delay: Literal[0, 1] = 0
     velocity: Literal["difference", "averaged"] = "difference"
-    feedforward: Literal["none", "values"] = "none"
+    feedforward: Literal["none", "values", "record"] = "none"
     encoder: Encoder = field(default_factory=Encoder)
     torque: Torque = field(default_factory=Torque)
     reference: ReferenceSettings = field(default_factory=ReferenceSettings)

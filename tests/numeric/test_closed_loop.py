@@ -10,16 +10,19 @@ import numpy as np
 import pytest
 from campaign import campaign
 
-from runtime import InputError, load_model
+from runtime import InputError, Record, identify, load_model
 from runtime.errors import SettingsError
 from runtime.estimators import fixed_point as iteration
 from runtime.estimators.closed_loop import closed_loop, slips, slowest
+from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import estimate_of
+from runtime.estimators.simulated_motion import judged
 from runtime.motion.reference import Reference, reference_of
 from runtime.motion.simulation import Simulator, parameters_of
 from runtime.observation.observation import observe
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
+from runtime.settings.controller import ReferenceSettings
 from runtime.settings.study import EstimateSettings, study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -279,3 +282,83 @@ def test_identify_by_instruments(emps_data, tmp_path):
         and found["details"]["hausman"]["parameter"] == "M1R"
         and len(found["details"]["trail"]) == found["iterations"]
     )
+
+
+@pytest.mark.parametrize("every", [4, 16])
+def test_a_record_slower_than_its_controller_is_its_own_reference(arm, every):
+    """Columns qr at 1 kHz, and at 250 Hz, of a controller at 4 kHz: the truth, from least squares, by cubic splines between the recorded references."""
+    model, study, simulator, truth, reference = arm
+    run = simulator.run(truth, reference)
+    slow = slice(None, None, every // 4)
+    record = Record(run.t[slow], run.q_measured[slow], run.tau_measured[slow], q_r=run.q_r[slow])
+    own = replace(study, controller=replace(study.controller, record_every=every, reference=ReferenceSettings()))
+    own = replace(own, signals=replace(own.signals, decimate=replace(own.signals.decimate, factor=40 // every)))
+    loop = closed_loop(model, [record], own, Simulator(model, own.controller), around=0.05)
+    assert loop.assumption == "" and all(fit.share > 90 and abs(fit.factor - 1) < 0.05 for fit in loop.law)
+    found = estimate_of(loop.measured(), EstimateSettings("didim"), model=model)
+    assert found.status == "ok", found.message
+    np.testing.assert_allclose(found.X, truth, rtol=0, atol=5e-3)
+    assert max(joint["position"] for joint in found.details["motion"]) < 0.1
+    with pytest.raises(SettingsError, match=rf"controller at 4000 Hz that records every 1\. tick; set controller\.record_every: {every}"):
+        closed_loop(model, [record], own, Simulator(model, replace(own.controller, record_every=1)))
+    with pytest.raises(SettingsError, match="is no multiple"):
+        closed_loop(model, [record], own, Simulator(model, replace(own.controller, rate=3700.0)))
+
+
+def test_a_law_of_other_gains_is_told_before_the_simulation(arm, clean):
+    """Gains three times those of the record: the law explains nothing, a third of it nearly all; the estimate says so and is not called good."""
+    model, study, _, _, _ = arm
+    law = replace(study.controller.law, kp=(1200, 360), kd=(90, 24))
+    own = replace(study, controller=replace(study.controller, law=law))
+    loop = closed_loop(model, [clean[0]], own, Simulator(model, own.controller), around=0.05)
+    for fit in loop.law:
+        assert fit.share < 0 and fit.best > 90 and fit.factor == pytest.approx(1 / 3, rel=0.03)
+    found = estimate_of(loop.measured(), EstimateSettings("didim"), model=model)
+    assert "not those of this record (best: joint 1" in found.message and found.details["law"][0]["best"] > 90
+
+
+def test_recorded_feedforward_and_known_torques_are_in_the_loop(arm):
+    """A spring on joint 2 that the model does not have, and a feed-forward torque, both recorded: without noise the truth."""
+    model, study, simulator, truth, reference = arm
+    fed = 0.8 * model.inverse_dynamics(reference.q, reference.qd, reference.qdd, truth)
+    spring = np.stack([np.zeros(len(reference)), 3 * np.sin(reference.q[:, 1])], axis=1)
+    run = simulator.run(truth, reference, ideal=True, feedforward=fed, disturbance=-spring)
+    record = Record(run.t, run.q, run.tau, q_r=run.q_r, tau_ff=fed[::4], tau_known=spring[::4])
+    own = replace(study, controller=replace(study.controller, feedforward="record", reference=ReferenceSettings()))
+    loop = closed_loop(model, [record], own, Simulator(model, own.controller), around=0.05)
+    assert all(fit.share > 90 for fit in loop.law)
+    found = estimate_of(loop.measured(), EstimateSettings("didim"), model=model)
+    assert found.status == "ok", found.message
+    np.testing.assert_allclose(found.X, truth, rtol=0, atol=5e-3)
+    with pytest.raises(SettingsError, match=r"no feed-forward torque; name its columns in record\.columns\.tau_ff"):
+        closed_loop(model, [Record(run.t, run.q, run.tau, q_r=run.q_r)], own, loop.simulator)
+    with pytest.raises(InputError, match="known torques are lost"):
+        closed_loop(model, [replace(record, name="changed")], own, simulator)
+
+
+def test_a_simulation_that_does_not_follow_is_no_result(arm, clean):
+    """A reference of another motion: positions are off with the true parameters too, and the status says so."""
+    model, study, simulator, truth, reference = arm
+    other = Reference.sampled(reference.q[::-1].copy(), reference.rate)
+    loop = closed_loop(model, [clean[0]], study, simulator, around=0.05)
+    loop = replace(loop, parts=tuple(replace(part, reference=other) for part in loop.parts))
+    status, message, details = judged(loop, loop.measured(), truth)
+    assert status == "simulation-apart" and details["motion"][0]["position"] > 20
+    assert "does not follow the record: position of joint 1 off by" in message
+    assert estimate_of(loop.measured(), EstimateSettings("didim"), model=model).status in ("simulation-apart", "not-converged")
+
+
+def test_a_fit_survives_a_validation_that_fails(arm, clean, monkeypatch):
+    """DIDIM by a subset of columns without ZZ1R has no inertia about joint 1: told, and the fit of all parameters stands."""
+    model, study, simulator, truth, reference = arm
+    record = simulator.run(truth, reference).record()
+    own = replace(study, estimate=EstimateSettings("didim"))
+    kept = tuple(name for name in model.BASE_PARAMETERS if name not in ("ZZ1R", "ZZ2"))
+    monkeypatch.setattr(
+        "runtime.identification.identification.essential_of",
+        lambda *given, **named: replace(essential_of(*given, **named), names=kept),
+    )
+    result = identify(model, record, own, simulator=simulator)
+    assert result.estimate.status == "ok" and result.usable
+    assert any("validation of essential parameters" in text for text in result.missing)
+    assert any(p.columns == "all" and not p.fitted for p in result.validation[0].predictions)
