@@ -6,6 +6,7 @@ size of their parameter, so that parameters are compared by their relative error
     W_w = diag(1/s_j) W diag(|X_i|)       cond      s_max/s_min of W_w
                                           logdet    -log det W_w'W_w
                                           sigma     largest %sigma_i, the root of the diagonal of C
+                                          record  largest %sigma_i over that of the motion of a record: sigma with the deviations there as sizes
     C = A W_w'Omega W_w A, A = (W_w'W_w)^-1       predicted covariance of X_i/|X_i|
 
 Omega is what the decimation makes of white torque noise: neighbouring rows are correlated, which costs a tenth of the precision or more.
@@ -182,7 +183,7 @@ def criterion_of(weights: Weights, observation: Observation, criterion: str) -> 
     """The criterion on the rows of the identification, exact; smaller is better."""
     if criterion == "cond":
         return weights.condition(observation)
-    if criterion == "sigma":  # white residuals: the order of candidates does not depend on it
+    if criterion in ("sigma", "record"):  # white residuals: the order of candidates does not depend on it
         return float(weights.relative_sigma(observation).max())
     return float(-2 * np.sum(np.log(np.abs(np.diag(np.linalg.qr(weights.matrix(observation), mode="r"))))))
 

@@ -138,7 +138,7 @@ def _logdet(A: Any) -> Any:
 def _spread(A: Any, criterion: str) -> Any:
     """Logarithm of the smooth bound of the criterion."""
     C = ca.solve(A, ca.DM.eye(A.shape[0]), "qr")
-    if criterion == "sigma":
+    if criterion in ("sigma", "record"):
         return ca.log(ca.sum1(ca.diag(C) ** 8)) / 8
     A4, C4 = (ca.mtimes(x, x) for x in (ca.mtimes(A, A), ca.mtimes(C, C)))
     return (ca.log(ca.sumsqr(A4)) + ca.log(ca.sumsqr(C4))) / 8

@@ -52,6 +52,7 @@ TOLERATED = 1e-3  # violation at the points of the grid of a start that is looke
 BEST = 3  # starts that are looked at on the grid of the controller
 WIDENINGS = 2  # of the margin, doubled each time
 LISTED = 10  # parameters of the table, the least certain ones
+NAMED = 5  # parameters, in a sentence
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,13 +127,43 @@ class Excitation:
         return usage(self.model, self.motion, self.limits, self.settings.rate, self.known.X)
 
     @property
+    def worse(self) -> dict[str, float]:
+        """Parameters that the motion of the record tells better, by name, with the ratio of predicted %sigma to that of the record, largest first."""
+        before = self.known.relative_sigma
+        ratios = {name: sigma / before[name] for name, sigma in self.relative_sigma.items() if before.get(name, 0.0) > 0}
+        return dict(sorted(((name, ratio) for name, ratio in ratios.items() if ratio > 1), key=lambda item: -item[1]))
+
+    @property
+    def comparison(self) -> str:
+        """The motion beside that of the record, parameter by parameter, a sentence; "" without record."""
+        before, worse = self.known.relative_sigma, self.worse
+        if not before:
+            return ""
+        if not worse:
+            return f" It tells each of these {len(before)} parameters better than the motion of the record."
+        named = ", ".join(f"{name} {self.relative_sigma[name]:.2g} % (record {before[name]:.2g} %)" for name in list(worse)[:NAMED])
+        more = f" and {len(worse) - NAMED} more" if len(worse) > NAMED else ""
+        return f" It tells {len(before) - len(worse)} of {len(before)} parameters better than the motion of the record, and WORSE: {named}{more}."
+
+    @property
+    def torques(self) -> str:
+        """What is not limited, a sentence; "" where every torque is."""
+        free = [str(j) for j, limit in zip(self.model.JOINTS, self.limits.tau, strict=True) if not np.isfinite(limit)]
+        if not free:
+            return ""
+        largest = np.abs(self.sampled()[-1]).max(axis=0)
+        values = ", ".join(f"{x:.3g}" for x in largest)
+        return f" Torque limits of joint {', '.join(free)} are unknown and were not kept: it asks for up to {values}; compare with the data sheet (limits: {{tau: [...]}})."
+
+    @property
     def verdict(self) -> str:
-        """Condition and the least certain parameter, in one sentence."""
+        """Condition, the least certain parameter, where the motion of the record is better, and limits that are unknown."""
         of_record = "" if self.known.condition is None else f" (motion of the record: {self.known.condition:.1f})"
         worst = max(self.relative_sigma, key=self.relative_sigma.__getitem__)
+        kept = "all limits" if np.isfinite(self.limits.tau).all() else "the limits of position, velocity and acceleration"
         return (
-            f"A motion of {self.motion.duration:.1f} s within all limits with weighted cond(W) {self.condition:.1f}{of_record}; "
-            f"least certain is {worst} with a predicted %sigma of {self.relative_sigma[worst]:.2g}."
+            f"A motion of {self.motion.duration:.1f} s within {kept} with weighted cond(W) {self.condition:.1f}{of_record}; "
+            f"least certain is {worst} with a predicted %sigma of {self.relative_sigma[worst]:.2g}.{self.comparison}{self.torques}"
         )
 
     def summary(self) -> dict[str, Any]:
@@ -145,6 +176,7 @@ class Excitation:
             "cond_of_record": self.known.condition,
             "relative_sigma": self.relative_sigma,
             "relative_sigma_of_record": self.known.relative_sigma,
+            "worse_than_record": self.worse,
             "torque_sigma": self.known.weights.s.tolist(),
             "limits_used": self.usage,
             "margin": self.margin,
@@ -215,6 +247,13 @@ def excite(
     settings = study.excitation or ExcitationSettings()
     known = _known(model, (records,) if isinstance(records, Record) else tuple(records), study, settings)
     limits, weights = limits_of(model, settings.limits), known.weights
+    if settings.criterion == "record" and not known.relative_sigma:
+        raise InputError("criterion: record compares with the motion of a record; give one, or ask for cond, logdet or sigma")
+    if settings.criterion == "auto":
+        settings = replace(settings, criterion="record" if known.relative_sigma else "cond")
+    if settings.criterion == "record":  # a column in units of its deviation by the record
+        before = np.array([known.relative_sigma[name] for name in weights.names])
+        weights = replace(weights, size=weights.size * np.maximum(before, 1e-3 * before.max()) / 100)
     require(model, "inverse_dynamics")
     path = str(getattr(symbolic, "__file__", symbolic) or casadi_path(model))
     problem = Problem(path, settings, weights, limits, known.X, dry_friction(model).smooth)
@@ -242,8 +281,8 @@ def excite(
             f"raise `grid` ({settings.grid:g} Hz)"
         )
     _, motion, margin, observation = min(candidates, key=lambda candidate: candidate[0])
-    sigma = _relative_sigma(weights, observation, study, settings.rate)
-    return Excitation(model, motion, weights.condition(observation), sigma, tuple(starts), margin, settings, limits, known)
+    sigma = _relative_sigma(known.weights, observation, study, settings.rate)
+    return Excitation(model, motion, known.weights.condition(observation), sigma, tuple(starts), margin, settings, limits, known)
 
 
 def _within(model: GeneratedModel, problem: Problem, starts: Sequence[Start]) -> Iterator[tuple[Motion, float]]:

@@ -38,7 +38,8 @@ class ExcitationSettings(Settings):
     parts : tuple of mapping
         Families in the order of the motion (`runtime.settings.trajectories`), each a mapping with its `family`.
     criterion : str
-        cond, logdet or sigma.
+        record, cond, logdet or sigma; auto: record where there is one, else cond. record is the largest predicted %sigma over that of the motion of
+        the record: below 1, every parameter is told better than by it.
     columns : str or tuple of str
         essential (of an estimate), all, or names.
     limits : mapping
@@ -77,7 +78,7 @@ class ExcitationSettings(Settings):
         {"family": "fourier", "period": 10.0, "harmonics": 5},
         {"family": "point-to-point", "points": 7, "travel": 1.0, "blend": 0.25},
     )
-    criterion: Literal["cond", "logdet", "sigma"] = "cond"
+    criterion: Literal["auto", "record", "cond", "logdet", "sigma"] = "auto"
     columns: Literal["essential", "all"] | Many[Text] = "essential"
     limits: Mapping[str, Any] = field(default_factory=dict)
     torque_rms: Many[Real] | None = None

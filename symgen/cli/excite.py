@@ -24,7 +24,7 @@ def excite(
         Path | None,
         typer.Option("-o", "--output", help="Folder for trajectory.csv, motion.yaml, excitation.json, report.html, the figure."),
     ] = None,
-    criterion: Annotated[str | None, typer.Option(help="cond, logdet or sigma.")] = None,
+    criterion: Annotated[str | None, typer.Option(help="record, cond, logdet or sigma; default: record where there is one.")] = None,
     columns: Annotated[str | None, typer.Option(help="essential, all, or names separated by commas.")] = None,
     starts: Annotated[int | None, typer.Option(min=1, help="Random starts.")] = None,
     rate: Annotated[float | None, typer.Option(help="Controller rate, Hz.")] = None,

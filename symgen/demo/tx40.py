@@ -23,6 +23,7 @@ import symgen
 from runtime import Cestac, Estimate, Identification, Record, Study
 from runtime.errors import DataUnavailableError
 from runtime.identification.coupling import recoupled
+from runtime.identification.identification import feasibility_of
 from runtime.markup import number
 from runtime.model.drives import Drives
 from runtime.records.datasets import dataset_study
@@ -43,6 +44,7 @@ DURATION, SHORT = 9.0, 4.0  # s of the simulated record, and of that of the quic
 SWEEP = tuple(2 * pi / counts for counts in (50000, 20000, 10000, 5000, 2000, 1000, 500))  # rad
 FASTER = 100.0  # Hz, the other cut-off
 SLOW = 0.01  # of the top speed of each joint: rows below it are left out in a variant
+ROUNDING = 1e-9  # rad, of the conversion to joint positions
 TOLERANCE = 0.07  # kg m^2 between the mean ZZ1R and Table 3, at every Delta
 KEY = "ZZ1R"
 COLOURED = ("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5")
@@ -105,8 +107,19 @@ class Demonstration:
         return (
             f"{'SIMULATED record: ' if self.simulated else ''}{len(names)} of {len(result.estimate.names)} parameters leave "
             f"{result.essential.estimate.relative_error:.1f} % of the torques of {result.model.NAME} unexplained, {result.prediction_error:.1f} % on a half "
-            f"of the record that the fit has not seen; by the residual of least squares, {steps}."
+            f"of the record that the fit has not seen; by the residual of least squares, {steps}. {self.physical}"
         )
+
+    @property
+    def physical(self) -> str:
+        """Whether a robot can have the parameters, a sentence."""
+        answer = self.result.feasibility
+        if answer is None:
+            return ""
+        if answer.feasible:
+            return "A physical robot can have all of these parameters."
+        blocking = ", ".join(name for name, _ in answer.blocking)
+        return f"No physical robot can have all of them (in the way: {blocking}): fit under these conditions before you simulate."
 
     def files(self, folder: Path) -> Files:
         """Contents of the output folder, by file name."""
@@ -128,6 +141,9 @@ def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], No
     progress("identification")
     result = runtime.identify(model, record, study)
     names = result.essential.names
+    progress("physical consistency, encoder")
+    advice = runtime.advise(model, record, study, columns=names, asked=(recorded_step(record),))
+    result = replace(result, feasibility=feasibility_of(result), advice=advice)
 
     def resolution(changed: Study, **settings: Any) -> Cestac:
         changed = replace(changed, cestac=replace(changed.cestac, **settings))
@@ -148,6 +164,12 @@ def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], No
         combinations[label] = resolution(changed, **settings)
     progress("other treatments of the record")
     return Demonstration(prepared, result, main, curve, torque, combinations, _variants(replace(prepared, study=study)))
+
+
+def recorded_step(record: Record) -> float:
+    """The coarsest step of the recorded positions, rad: of every joint the smallest change between two samples that is none of rounding."""
+    changes = np.abs(np.diff(record.q, axis=0))
+    return float(max(column[column > ROUNDING].min() for column in changes.T))
 
 
 def _combinations(study: Study, b: int) -> list[tuple[str, Study, dict[str, Any]]]:
