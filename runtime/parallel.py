@@ -18,15 +18,17 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import wraps
 from importlib.metadata import version
 from multiprocessing import get_context, parent_process
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from runtime.errors import InputError
 
 K = TypeVar("K")
 C = TypeVar("C")
 R = TypeVar("R")
+P = ParamSpec("P")
 
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "BLIS_NUM_THREADS")
 PATIENCE = 3  # times in a row that processes may die before any task is done
@@ -226,3 +228,16 @@ def _run_there(task: Callable[[C, K], R], context: C, key: K) -> R:
 
     with threadpool_limits(1):
         return task(context, key)
+
+
+def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
+    """The function with one BLAS thread while it runs: its matrices are small, and several threads wait for each other ten times as long as they compute."""
+
+    @wraps(function)
+    def alone(*args: P.args, **kwargs: P.kwargs) -> R:
+        from threadpoolctl import threadpool_limits
+
+        with threadpool_limits(1, "blas"):
+            return function(*args, **kwargs)
+
+    return alone

@@ -89,8 +89,10 @@ class Feasibility:
         return f"NOT physically feasible: no positive mass density and friction gives these parameters; in the way: {named}"
 
 
-def feasibility(physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None) -> Feasibility:
-    """Whether base parameters X, shape (len(names),), are those of a physical robot within the limits."""
+def feasibility(
+    physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None, *, blame: bool = True
+) -> Feasibility:
+    """Whether base parameters X, shape (len(names),), are those of a physical robot within the limits. blame : all conditions in the way, not the first."""
     rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, scales(physical))
     first = margin(physical.conditions, rows, space)
     if not first.solved:
@@ -100,6 +102,8 @@ def feasibility(physical: PhysicalModel, names: Sequence[str], X: Array, limits:
         worst = max(released.duals, key=lambda name: released.duals[name])
         blocking.append((worst, released.margin))
         conditions = [c for c in conditions if c.name != worst]
+        if not blame:
+            break
         released = margin(conditions, rows, space)
     return Feasibility(first.margin, not blocking, tuple(blocking), first.chi)
 

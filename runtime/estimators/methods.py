@@ -171,7 +171,8 @@ def linear_companion(settings: EstimateSettings) -> EstimateSettings:
 
 def point_estimate(settings: EstimateSettings) -> EstimateSettings:
     """The settings of an estimate whose deviations nobody reads: without resampling."""
-    return replace(settings, options={**settings.options, "bootstrap": 0}) if method_of(settings).resamples else settings
+    brief = {"bootstrap": 0, **({"explain": False} if settings.method == "feasible" else {})}
+    return replace(settings, options={**settings.options, **brief}) if method_of(settings).resamples else settings
 
 
 def observed(

@@ -20,6 +20,7 @@ from runtime.identification.identification import identify
 from runtime.identification.result import Identification
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import observe
+from runtime.parallel import single_threaded
 from runtime.progress import at
 from runtime.records.reading import read_records
 from runtime.records.record import Record
@@ -79,6 +80,7 @@ class Ranking:
         return f"{self.table().to_text()}\n\n{self.verdict}"
 
 
+@single_threaded
 def compare(model: GeneratedModel, candidates: Mapping[str, Candidate]) -> Ranking:
     """Identify with each of several treatments, and order them by what they predict.
 

@@ -30,6 +30,7 @@ from runtime.identification.validation import direct_comparison, sets_validation
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import physical_model
 from runtime.observation.system import halves
+from runtime.parallel import single_threaded
 from runtime.progress import at
 from runtime.records.provenance import origin, record_names
 from runtime.records.reading_by_blocks import records_or_streams
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 __all__ = ["Identification", "feasibility_of", "identify", "whole_records"]
 
 
+@single_threaded
 def identify(
     model: GeneratedModel,
     records: Record | Stream | Sequence[Record | Stream],
