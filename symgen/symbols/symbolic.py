@@ -74,6 +74,12 @@ class SymbolicRobot:
         if name not in MODELS:
             raise SymgenError(f"no model is called {name!r}; expected one of {', '.join(MODELS)}")
         robot = self.source.robot
+        if (of is not None or frame) and not MODELS[name].of_frames:
+            raise SymgenError(
+                f"{name} is of no frame; leave out of and frame (they are for {', '.join(m for m in MODELS if MODELS[m].of_frames)})"
+            )
+        if rows is not None and name != "determinant":
+            raise SymgenError(f"rows are for the determinant; leave them out of {name}")
         of = robot.frames[-1].j if of is None else of
         for j in (of, frame):
             if j != 0 and j not in {f.j for f in robot.frames}:

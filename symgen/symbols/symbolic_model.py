@@ -206,10 +206,16 @@ class SymbolicModel:
                 raise SymgenError(f"rows {list(self.rows)}; expected {n} different rows of the Jacobian among 1 to 6 ({', '.join(TWIST)})")
             return [k - 1 for k in self.rows]
         moved = [k for k, row in enumerate(matrix) if any(row)]
-        if len(moved) != n:
+        if n > 6:
             raise SymgenError(
-                f"the Jacobian of frame {self.request.of} of {self.source.robot.name} in frame {self.request.frame} has {len(moved)} rows that are "
-                f"not zero ({', '.join(TWIST[k] for k in moved)}) and {n} columns; name {n} of its rows, 1 to 6: rows={tuple(range(1, n + 1))}, --rows {','.join(map(str, range(1, n + 1)))}"
+                f"the Jacobian of {self.source.robot.name} is 6 x {n}: no rows of it make a square matrix; take jacobian, and det(J*J.T) in SymPy"
+            )
+        if len(moved) != n:
+            first = [k + 1 for k in (moved + [k for k in range(6) if k not in moved])[:n]]
+            raise SymgenError(
+                f"the Jacobian of frame {self.request.of} of {self.source.robot.name} in frame {self.request.frame} has {len(moved)} rows that "
+                f"are not zero ({', '.join(TWIST[k] for k in moved)}) and {n} columns; name {n} of its rows, 1 to 6: "
+                f"rows={tuple(first)}, --rows {','.join(map(str, first))}"
             )
         return moved
 

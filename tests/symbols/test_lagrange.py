@@ -124,7 +124,7 @@ def test_base_parameters_give_the_torques_of_standard_ones(name: str) -> None:
     assert base.inverse_dynamics().free_symbols & {x for x, e in made_of.items() if x != e}
 
 
-@pytest.mark.parametrize("name", ["emps", "planar_2r"])
+@pytest.mark.parametrize("name", ["emps", pytest.param("planar_2r", marks=campaign)])
 def test_direct_model_solves_the_inverse_one(name: str) -> None:
     models = symbolic(ROBOTS[name])
     torque = Matrix([models.symbols[f"GAM{j}"] for j in ROBOTS[name].joints])
@@ -134,7 +134,7 @@ def test_direct_model_solves_the_inverse_one(name: str) -> None:
         assert is_zero(sympy.numer(sympy.together(e))) and not is_zero(below)
 
 
-@pytest.mark.parametrize("name", ["planar_2r", "rpr"])
+@pytest.mark.parametrize("name", ["planar_2r", pytest.param("rpr", marks=campaign)])
 def test_kinematics(name: str) -> None:
     """J of the origin is its derivative, V = J qd, Jd qd its derivative in space, VP = J qdd + Jd qd, in frame 0; in other frames turned."""
     robot = ROBOTS[name]

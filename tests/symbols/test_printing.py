@@ -156,6 +156,9 @@ BAD = [
     ({"robot": "planar_2r", "name": "pose", "form": "open"}, "expected one of closed, recursive"),
     ({"robot": "planar_2r", "name": "pose", "format": "word"}, "expected one of text, latex"),
     ({"robot": "sr400", "name": "closure"}, "passive=symbols keeps them"),
+    ({"robot": "panda", "name": "determinant"}, "det(J*J.T) in SymPy"),
+    ({"robot": "tx40", "name": "gravity", "of": 3}, "leave out of and frame"),
+    ({"robot": "tx40", "name": "gravity", "rows": (1,)}, "rows are for the determinant"),
 ]
 
 
