@@ -83,7 +83,9 @@ def test_a_simulated_record_is_identified_and_applied(path: Path, lock: dict[str
     t, *states = motion(len(model.JOINTS), 1, 12)
     tau = model.inverse_dynamics(*states, model.base_parameters(other_values(model, 2, offset=0.2)))
     noise = np.random.default_rng(1).normal(0, 0.01, tau.shape) * np.abs(tau).max(axis=0)
-    study = runtime.Study(signals={"lowpass": {"cutoff": 8}}, estimate={"method": "feasible", "options": {"bootstrap": 0, "prior": "none", "reach": None}})
+    study = runtime.Study(
+        signals={"lowpass": {"cutoff": 8}}, estimate={"method": "feasible", "options": {"bootstrap": 0, "prior": "none", "reach": None}}
+    )
     estimate = runtime.estimate(model, runtime.Record(t, states[0], tau + noise), study)
     applied = symgen.apply(estimate, path, lock=lock)
     agrees(applied, path, model, estimate.X, tmp_path, tuple(x[::100] for x in states), lock)
