@@ -1,6 +1,7 @@
 """Resolution advisor against sampling: the steps it predicts for 1 % and 5 %, and what both ways cost.
 
     python benchmarks/advisor.py [emps tx40 haptic]          needs the records: set SYMGEN_DATA, or be on line
+    python benchmarks/advisor.py --real [emps tx40 haptic]   real encoders, read as positions and as counts, in place of the chapter's law
 
 Steps: CESTAC at steps in the ratio 1.3, RUNS runs each, all encoders alike; where |change of the mean| first reaches a limit between two of them, on
 logarithmic axes. The interval is that of |change| +- the half width of Student's. Predicted over sampled should be within 15 %.
@@ -29,6 +30,7 @@ import symgen  # noqa: E402
 from runtime.estimators.essential import essential_of  # noqa: E402
 from runtime.estimators.linear import assemble  # noqa: E402
 from runtime.estimators.methods import linear_system  # noqa: E402
+from runtime.model.generated import drives_of  # noqa: E402
 from runtime.observation.observation import observe  # noqa: E402
 from runtime.observation.position_errors import perturbation  # noqa: E402
 from runtime.records.datasets import dataset_study  # noqa: E402
@@ -37,6 +39,7 @@ from runtime.resolution.advice import crossing  # noqa: E402
 from runtime.resolution.advisor import LIMITS, advise, sampled_level  # noqa: E402
 from runtime.resolution.cestac import cestac  # noqa: E402
 from runtime.resolution.perturbed import Task, prepared  # noqa: E402
+from runtime.resolution.readers import RealEncoders  # noqa: E402
 from runtime.settings.study import study_from_mapping  # noqa: E402
 from symgen.demo.haptic_motion import haptic_record, haptic_study  # noqa: E402
 
@@ -44,6 +47,28 @@ RUNS = {"emps": 100, "tx40": 60, "haptic": 30}
 LEVELS = 8
 ROUNDS = 5
 RATIO = 1.3
+REAL_RUNS = 12
+MAIN = (
+    "ZZ1R",
+    "FV1",
+    "FS1",
+    "XX2R",
+    "ZZ2R",
+    "MX2R",
+    "FV2",
+    "FS2",
+    "MY3R",
+    "Ia3",
+    "FV3",
+    "FS3",
+    "Ia4",
+    "FV4",
+    "FS4",
+    "Ia5",
+    "FV5",
+    "FS5",
+    "FV6",
+)
 
 
 def opened(name, model, folder):
@@ -130,13 +155,47 @@ def needed_runs(whole, model, record, names, level):
     return total
 
 
+def real_table(name, model, study, record, names):
+    """Steps predicted by the quadrature over the phase, and steps at which REAL_RUNS runs of random phase cross the limits, by reader and parameter."""
+    law = replace(study, cestac=replace(study.cestac, rounding="phase", delta=()))
+    start = time.process_time()
+    advice = advise(model, record, law, columns=names, encoders=("all",), confirm=False)
+    print(f"\n{name}: predicted in {time.process_time() - start:.0f} s of CPU; sampled by {REAL_RUNS} runs", flush=True)
+    for reader in advice.real:
+        own = law if reader.reader == "lowpass" else replace(law, signals=replace(law.signals, reader="counts"))
+        real = RealEncoders(model, [record], own, names, drives_of(model), {}, reader.reader)
+        first, ratios = reader.encoders[0], []
+        for limit in first.limits:
+            if not np.isfinite(limit.delta):
+                print(
+                    f"  {reader.reader:8} {limit.percent:g} %: {'none' if np.isnan(limit.delta) else 'every step'} ({limit.parameter}), {first.delta[0]:.3g} to {first.delta[-1]:.3g}"
+                )
+                continue
+            grid = limit.delta * RATIO ** np.arange(-2, 3.0)
+            e = np.abs([real.sampled(range(record.n), delta, REAL_RUNS).change for delta in grid])
+            steps = {n: crossing(grid, e[:, names.index(n)], limit.percent) for n in advice.deciding}
+            reached = first.reached(limit.percent)
+            ratios += [reached[names.index(n)] / s for n, s in steps.items() if np.isfinite([reached[names.index(n)], s]).all()]
+            sampled = min((s for s in steps.values() if np.isfinite(s)), default=np.nan)
+            which = min(steps, key=lambda n: steps[n] if np.isfinite(steps[n]) else np.inf)
+            print(f"  {reader.reader:8} {limit.percent:g} %: predicted {limit.delta:.3e} ({limit.parameter}), sampled {sampled:.3e} ({which}), "
+                  f"ratio {limit.delta / sampled:.2f}; at the predicted step {limit.parameter} sampled {e[2][names.index(limit.parameter)]:.2f} %", flush=True)  # fmt: skip
+        print(
+            f"  {reader.reader:8} by parameter: {sum(abs(r - 1) <= 0.2 for r in ratios)} of {len(ratios)} predicted steps within 20 % of the sampled ones"
+        )
+
+
 def main():
     """Print the tables of the robots named."""
-    for name in sys.argv[1:] or RUNS:
+    real = "--real" in sys.argv
+    for name in [n for n in sys.argv[1:] if n != "--real"] or RUNS:
         with TemporaryDirectory() as folder:
             model = symgen.model(name)
             study, record = opened(name, model, Path(folder))
             found = essential_of(observe(model, record, study), study.essential, study.estimate)
+            if real:
+                real_table(name, model, study, record, MAIN if name == "tx40" else found.names)
+                continue
             advice, level = steps_table(name, model, study, record, found.names)
             cost(name, model, study, record, found.names, advice, level)
 

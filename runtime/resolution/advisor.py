@@ -315,7 +315,8 @@ def assumptions(
     if real:
         encoders.append(
             f"Real encoders: counts of steps Delta, lines {lines}, the phase random by encoder and run, {place}. The reader knows the step, not the phase. "
-            f"Curves are a quadrature over the phase, without first order; steps of fewer than {LINES} in the motion of a joint are not judged."
+            f"Curves are a quadrature over the phase, without first order; steps of fewer than {LINES} in the motion of a joint are not judged. "
+            "Both estimates stand on the rows that the reader leaves in; rows in which dry friction has no certain direction are not among them."
         )
     return (
         *encoders,

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from runtime.errors import InputError
 from runtime.estimators.closed_loop import LoopPart
 from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import linear_companion, observed, point_estimate
@@ -222,7 +223,11 @@ def run_states(model: GeneratedModel, task: Task, record: PreparedRecord, q: Arr
     signals = record.selection.signals
     if signals.reader == "lowpass" or not level.delta:
         return record.states or filtered_states(q, record.rate, signals)
-    return observed_states(model, q, record.rate, replace(signals, step=level.delta, side=task.settings.side), drives=task.drives)
+    known = replace(signals, step=level.delta, side=task.settings.side)
+    try:
+        return observed_states(model, q, record.rate, known, drives=task.drives)
+    except np.linalg.LinAlgError as e:
+        raise InputError(f"counts of steps of {level.label} cannot be read on this motion ({e}); use finer steps") from e
 
 
 def system_of(

@@ -2,7 +2,10 @@
 
     error of encoder i, as read         e_i = reader(phi_i + Delta round((x_i - phi_i)/Delta)) - reader of the record, filtered alike
     states with the encoders S coarse   those of the record + sum over i in S of (R^-1)_i e_i
-    change at Delta                     mean of the least squares of some phases, over that of the record, less 1
+    change at Delta                     mean over phases of the least squares, over that of the record on the same rows, less 1
+
+The reader of counts leaves out rows in which dry friction has no certain direction. What that alone does to the estimate is no error of the encoder and is
+not in the change; `runtime.resolution.cestac`, which compares with all rows of the record, has both.
 
 White noise does not describe a sawtooth that is locked to the motion, still less what a reader of counts leaves of it, so no first-order law is used:
 the mean over the random phase is a quadrature. Its nodes are equidistant, shuffled from encoder to encoder, so that the harmonics of the sawtooth cancel
@@ -24,8 +27,8 @@ from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.observation.counts import read_counts
 from runtime.observation.filters import SpeedErrors, States, filtered_states
-from runtime.observation.observation import observation_from_states, stack
-from runtime.observation.states import encoder_root, joint_states
+from runtime.observation.observation import Observation, Selection, observation_from_states, stack
+from runtime.observation.states import certain_rows, encoder_root, joint_states
 from runtime.records.record import Record
 from runtime.resolution.advice import LIMITS, EncoderAdvice, Limit, ReaderAdvice, Sampled, confirmed, crossing, sampled
 from runtime.resolution.own_encoder import FINER
@@ -89,7 +92,7 @@ class RealEncoders:
             x = record.q if side is None else side.motor_position(record.q)
             states = part.states or filtered_states(record.q, record.rate, part.selection.signals)
             self.parts.append(Encoders(part, x, replace(states, errors=None), encoder_root(side, record.n), side))
-        self.reference = self._solved([self._none(part) for part in self.parts], ())
+        self.reference = self._solved([self._observed(part, part.states, part.record.selection) for part in self.parts])
 
     @property
     def coarsest(self) -> Array:
@@ -108,16 +111,16 @@ class RealEncoders:
 
     def change(self, nodes: Sequence[Sequence[Errors]], encoders: Sequence[int]) -> Array:
         """Mean change of the estimate, shape (b,), %, with these encoders coarse."""
-        return np.asarray(100 * (np.mean([self._solved(errors, encoders) for errors in nodes], axis=0) / self.reference - 1))
+        return np.asarray(100 * (np.mean([self._ratio(errors, encoders) for errors in nodes], axis=0) - 1))
 
-    def sampled(self, reference: Estimate, encoders: Sequence[int], delta: float, runs: int | None = None) -> Sampled:
+    def sampled(self, encoders: Sequence[int], delta: float, runs: int | None = None) -> Sampled:
         """CESTAC by law phase with these encoders coarse, eqs. (17), (18), (21)."""
         X = []
         for run in range(runs or self.study.cestac.runs):
             rng = stream(self.study.cestac.seed, run, *encoders)
             phases = delta * rng.random(len(self.model.JOINTS))
-            X.append(self._solved([self._errors(part, delta, phases, encoders, rng) for part in self.parts], encoders))
-        return sampled(delta, np.array(X), self.reference)
+            X.append(self._ratio([self._errors(part, delta, phases, encoders, rng) for part in self.parts], encoders))
+        return sampled(delta, np.array(X), np.ones(len(self.names)))
 
     def _errors(self, part: Encoders, delta: float, phases: Array, encoders: Sequence[int], rng: np.random.Generator) -> Errors:
         uneven, chosen = self.study.cestac.uneven, list(encoders)
@@ -131,7 +134,7 @@ class RealEncoders:
         else:
             read = filtered_states(np.asfortranarray(y), rate, signals)
         into = np.linalg.inv(part.root).T
-        errors = self._none(part).states
+        errors = States(np.zeros_like(part.x), np.zeros_like(part.x), np.zeros_like(part.x))
         for got, of, error, at in zip(_three(read), _three(part.states), _three(errors), (True, False, False), strict=True):
             if part.drives is None:
                 exact = of
@@ -140,23 +143,27 @@ class RealEncoders:
             error[:, chosen] = got - exact[:, chosen]
         return Errors(errors, deviation)
 
-    def _none(self, part: Encoders) -> Errors:
-        zero = np.zeros_like(part.x)
-        return Errors(States(zero, zero.copy(), zero.copy()), zero)
-
-    def _solved(self, errors: Sequence[Errors], encoders: Sequence[int]) -> Array:
-        """X with the errors of some encoders."""
+    def _ratio(self, errors: Sequence[Errors], encoders: Sequence[int]) -> Array:
+        """X with the errors of some encoders over X without, on the same rows, shape (b,)."""
         chosen = np.isin(np.arange(len(self.model.JOINTS)), list(encoders))
-        rows = []
+        coarse, exact = [], []
         for part, error in zip(self.parts, errors, strict=True):
             q, qd, qdd = (of + (own * chosen) @ part.root.T for of, own in zip(_three(part.states), _three(error.states), strict=True))
-            states = States(q, qd, qdd, SpeedErrors(error.deviation * chosen, part.root) if self.reader == "counts" else None)
-            record = part.record
-            rows.append(
-                observation_from_states(
-                    self.model, states, record.torque, record.selection, files=record.files, columns=self.names, constants=self.constants
-                )
-            )
+            states, selection = States(q, qd, qdd), part.record.selection
+            if self.reader == "counts":
+                known = replace(states, errors=SpeedErrors(error.deviation * chosen, part.root))
+                certain = certain_rows(self.model, known[selection.samples][selection.kept], self.constants)
+                selection = replace(selection, mask=selection.mask & certain)
+                exact.append(self._observed(part, part.states, selection))
+            coarse.append(self._observed(part, states, selection))
+        return np.asarray(self._solved(coarse) / (self._solved(exact) if exact else self.reference))
+
+    def _observed(self, part: Encoders, states: States, selection: Selection) -> Observation:
+        return observation_from_states(
+            self.model, states, part.record.torque, selection, files=part.record.files, columns=self.names, constants=self.constants
+        )
+
+    def _solved(self, rows: Sequence[Observation]) -> Array:
         return linear_system(rows[0] if len(rows) == 1 else stack(rows), self.estimate).solve().X
 
 
@@ -188,7 +195,7 @@ def real_encoders(
             unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
             advice = _advice(label, *curves[label], reference, unit)
             if confirm:
-                advice = confirmed(advice, reference, lambda delta, own=own, real=real: real.sampled(reference, own, delta))  # type: ignore[misc]
+                advice = confirmed(advice, reference, lambda delta, own=own, real=real: real.sampled(own, delta))  # type: ignore[misc]
             encoders.append(advice)
             progress()
         advices.append(ReaderAdvice(reader, tuple(encoders), tuple(part.record.note for part in real.parts if part.record.note)))

@@ -88,7 +88,14 @@ def test_one_run_on_the_tx40_record_is_the_plain_pipeline(tx40_data, tmp_path):
     ("seed", "changed"),
     [
         (2, study()),
-        (3, study(Signals(median=1, lowpass=Lowpass(cutoff=30, order=3), decimate=Decimate(factor=7, phase="last", padding="matlab")))),
+        (
+            3,
+            study(
+                Signals(median=1, lowpass=Lowpass(cutoff=30, order=3), decimate=Decimate(factor=7, phase="last", padding="matlab")),
+                rounding="phase",
+                uneven=0.1,
+            ),
+        ),
         (5, study(Signals(median=3, decimate=Decimate(factor=60)), rounding="quantise")),
         (6, study(Signals(median=1, decimate=None), Rows(window=(0.1, 0.9), low_speed=0.3), torque=(0.01,), common=True)),
         (7, study(Signals(median=1, lowpass=None, ends="second-order", decimate=Decimate(factor=4)), Rows(trim=0), rounding="gaussian")),

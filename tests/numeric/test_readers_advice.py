@@ -34,7 +34,7 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
     sampled = 100 * (level.mean / found.reference.X - 1)
     assert np.allclose(real.reference, found.reference.X, rtol=1e-9)
     assert np.all(np.abs(real.change(nodes, (0, 1)) - sampled) < 3 * level.half_width_percent / 2 + 0.2 * np.abs(sampled) + 0.3)
-    alone = real.sampled(found.reference, (1,), STEP, 40)
+    alone = real.sampled((1,), STEP, 40)
     assert np.all(np.abs(real.change(nodes, (1,)) - alone.change) < 3 * alone.half_width / 2 + 0.2 * np.abs(alone.change) + 0.3)
 
 
