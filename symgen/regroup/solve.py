@@ -13,6 +13,7 @@ holds for these numbers alone. Nothing is assumed of the result: the certificate
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import combinations, combinations_with_replacement, product
@@ -37,6 +38,8 @@ MAX_UNKNOWNS = 500
 MAX_PRIMES = 24  # of 31 bits each: numerators and denominators of some 110 digits
 MAX_WORK = 4e8  # multiplications of one recognition, some seconds
 FREEDOMS = (("numbers", "pi"), ("numbers",), ())  # what is an indeterminate beside constants and transcendental angles
+MANY = 2  # variables beyond which those that are mere factors are set apart
+SCALES, POWERS = (2, 3), (1, -1, 2, -2, 3, -3, 4, -4)
 DEGREES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (3, 0), (3, 2), (3, 3), (4, 0), (4, 4), (6, 0), (6, 6))
 
 Products = Sequence[tuple[Expression, ...]]
@@ -183,7 +186,7 @@ class Pool:
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """{place among [*Q, *P]: residue} of the first relation among the columns, or None where there is none."""
+        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None where there is none; cos(a) and cos(3a) make others."""
         count = len(P) + len(Q) + 4
         self.grow(count)
         beta = self.beta[name]
@@ -191,10 +194,22 @@ class Pool:
             return None
         columns = [-beta[:count, k] * self.value(m)[:count] % self.p for m in Q] + [self.value(m)[:count] for m in P]
         pivots, R = rref(np.stack(columns, axis=1), self.p)
-        free = next((c for c in range(len(columns)) if c not in pivots), None)
-        if free is None:
-            return None
-        return {c: -int(R[i, free]) % self.p for i, c in enumerate(pivots) if c < free and R[i, free]} | {free: 1}
+        for free in (c for c in range(len(Q), len(columns)) if c not in pivots):
+            entries = {c: -int(R[i, free]) % self.p for i, c in enumerate(pivots) if c < free and R[i, free]}
+            if min(entries, default=free) < len(Q):
+                return entries | {free: 1}
+        return None
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """What a coefficient depends on: `free` variables in some way, others as a factor with a power."""
+
+    free: tuple[Variable, ...]
+    powers: Mapping[str | Number | Call, int]
+
+    def __len__(self) -> int:
+        return len(self.free)
 
 
 class Recognition:
@@ -223,25 +238,49 @@ class Recognition:
                     result[name] = found
         return result
 
-    def _what_matters(self) -> dict[str, list[list[Variable]]]:
+    def _what_matters(self) -> dict[str, list[Dependence]]:
         source = self.pools[0].source
         variables = source.variables
         reference, changed = source.random(1), source.random(1)
-        cases = [reference] + [reference | {v: changed[v]} for v in variables]
-        beta = source.beta({v: np.concatenate([case[v] for case in cases]) for v in variables}, len(cases))
-        result: dict[str, list[list[Variable]]] = {}
-        for name, b in beta.items():
+
+        def at(cases: list[dict[Variable, Array]]) -> dict[str, Array | None]:
+            return source.beta({v: np.concatenate([case[v] for case in cases]) for v in variables}, len(cases))
+
+        result: dict[str, list[Dependence]] = {}
+        for name, b in at([reference] + [reference | {v: changed[v]} for v in variables]).items():
             if b is None:
                 self.reasons[name] = "the relation does not hold for every geometry"
             else:
-                result[name] = [[v for i, v in enumerate(variables, start=1) if b[i, k] != b[0, k]] for k in range(b.shape[1])]
+                moved = [[v for i, v in enumerate(variables, start=1) if b[i, k] != b[0, k]] for k in range(b.shape[1])]
+                result[name] = [Dependence(tuple(vs), {}) for vs in moved]
+        many = [
+            v for v in variables if not isinstance(v, tuple) and any(len(d) > MANY and v in d.free for ds in result.values() for d in ds)
+        ]
+        scaled = at([reference] + [reference | {v: reference[v] * n % source.p} for v in many for n in SCALES]) if many else {}
+        for name, b in scaled.items():
+            for k, d in enumerate(result.get(name, [])):
+                if len(d) > MANY and b is not None:
+                    powers = {
+                        v: self._power(b[0, k], [b[1 + len(SCALES) * i + j, k] for j in range(len(SCALES))]) for i, v in enumerate(many)
+                    }
+                    known = {v: n for v, n in powers.items() if n and v in d.free}
+                    result[name][k] = Dependence(tuple(v for v in d.free if v not in known), known)
         return result
 
-    def _recognise(self, name: str, k: int, matters: Sequence[Variable]) -> Expression | None:
+    def _power(self, reference: int, scaled: Sequence[int]) -> int:
+        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 where it does not."""
+        p = self.pools[0].p
+        ratios = [int(x) * pow(int(reference), -1, p) % p for x in scaled] if reference else []
+        return next((n for n in POWERS if ratios == [pow(c, n, p) for c in SCALES]), 0)
+
+    def _recognise(self, name: str, k: int, depends: Dependence) -> Expression | None:
+        matters = depends.free
+        above, below = (tuple(_atom(v) for v, n in depends.powers.items() for _ in range(sign * n)) for sign in (1, -1))
         for (numerator, denominator), angles in product(DEGREES, self._choices(matters)):
             if comb(len(matters) - sum(isinstance(v, tuple) for v in matters) + len(angles) + numerator, numerator) > MAX_UNKNOWNS:
                 continue  # more products without a sine than may be looked for
-            P, Q = self._monomials(matters, angles, numerator), self._monomials(matters, angles, denominator)
+            P = [(*m, *above) for m in self._monomials(matters, angles, numerator)]
+            Q = [(*m, *below) for m in self._monomials(matters, angles, denominator)]
             if len(P) + len(Q) + 4 > MAX_UNKNOWNS or (numerator and len(P) == 1):
                 continue
             self.work += (len(P) + len(Q)) ** 3
@@ -258,7 +297,7 @@ class Recognition:
                     self.reasons[name] = "a coefficient is not rational in what may vary"
                     return None
                 return _fraction(entries, P, Q)
-        self.reasons[name] = f"no fraction of degree up to {DEGREES[-1]} in {_texts(matters) or 'rational numbers'}"
+        self.reasons[name] = f"no fraction of degree up to {DEGREES[-1]} in {_texts((*matters, *depends.powers)) or 'rational numbers'}"
         return None
 
     def _rationals(self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products) -> dict[int, Fraction] | None:

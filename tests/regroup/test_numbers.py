@@ -19,7 +19,7 @@ from symgen.description.expression import Expression, Number, call
 from symgen.emit.certified import certified_files
 from symgen.regroup.certificate import Certificate, certify_formulas
 from symgen.regroup.numbers import kept
-from symgen.regroup.regrouping import BaseParameter, Regrouping
+from symgen.regroup.regrouping import EXACT, BaseParameter, Regrouping
 
 HEAD = "symgen: 1\nname: x\ngravity: {gravity}\nconstants: {{{constants}}}\nframes:\n"
 SLOWEST = 60.0  # s of processor time, a bound that no robot comes near
@@ -230,6 +230,12 @@ def test_many_random_robots_with_numbers(start: int) -> None:
     results = campaign_of(range(1000 + start, 1020 + start))
     exact = sum(bool(certificate.primes) for _, _, certificate in results)
     print(f"seeds {start}: {exact} of {len(results)} exact, slowest {max(t for _, t, _ in results):.1f} s")
+
+
+@pytest.mark.parametrize("seed", [1257, 2035, 1554, 2099])
+def test_coefficients_of_many_numbers_and_angles_are_recognised(seed: int) -> None:
+    """Gears as factors; angles whose cosines are polynomials of each other."""
+    assert regrouping(numeric_robot(seed)).method == EXACT
 
 
 def test_the_mix() -> None:
