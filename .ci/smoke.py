@@ -70,6 +70,7 @@ def main() -> None:
     command("new", "arm.yaml")
     command("check", "arm.yaml")
     command("show", "arm.yaml", "--html")
+    command("show", "arm.yaml", "--model", "inertia_matrix", "--format", "sympy")
     command("convert", "tx40", "tx40.par")
     command("convert", "tx40.par", "again.yaml")
     command("generate", "arm.yaml", "planar_2r", "-o", "models", "--target", "numpy,casadi,c,xp")

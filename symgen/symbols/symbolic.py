@@ -162,7 +162,10 @@ class SymbolicRobot:
         return self._sympy("jacobian", of=of, frame=frame)
 
     def determinant(self, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None) -> Any:
-        """Determinant of the Jacobian with six joints, or of as many of its rows (from 1) as there are joints; rows that are not zero if left out."""
+        """Determinant of the Jacobian with six joints, or of as many of its rows (from 1) as there are joints; rows that are not zero if left out.
+
+        Factored over the rationals, cosines and sines as symbols: the factors are the singularities.
+        """
         return self._sympy("determinant", of=of, frame=frame, rows=rows)
 
     def jacobian_rate(self, of: int | None = None, frame: int = 0) -> Any:

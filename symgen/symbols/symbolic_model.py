@@ -181,6 +181,10 @@ class SymbolicModel:
     def _determinant(self, d: Derivation) -> tuple[Expansion, dict[Place, Polynomial]]:
         """Of the whole Jacobian in the frames that give the fewest terms: neither the frame nor the point of the last link changes it."""
         robot, n, best = self.source.robot, len(self.source.robot.joints), None
+        if n > 6:
+            raise SymgenError(
+                f"the Jacobian of {robot.name} is 6 x {n}: no rows of it make a square matrix; take jacobian, and det(J*J.T) in SymPy"
+            )
         path = robot.path(self.request.of)
         if n == 6 and self.rows is None and not self.source.closure.tied:
             last = [j for j in path if set(robot.joints) <= set(robot.path(j))]
@@ -206,10 +210,6 @@ class SymbolicModel:
                 raise SymgenError(f"rows {list(self.rows)}; expected {n} different rows of the Jacobian among 1 to 6 ({', '.join(TWIST)})")
             return [k - 1 for k in self.rows]
         moved = [k for k, row in enumerate(matrix) if any(row)]
-        if n > 6:
-            raise SymgenError(
-                f"the Jacobian of {self.source.robot.name} is 6 x {n}: no rows of it make a square matrix; take jacobian, and det(J*J.T) in SymPy"
-            )
         if len(moved) != n:
             first = [k + 1 for k in (moved + [k for k in range(6) if k not in moved])[:n]]
             raise SymgenError(

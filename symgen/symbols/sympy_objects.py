@@ -17,6 +17,8 @@ from symgen.symbols.closed import ClosedForm
 from symgen.symbols.listing import Listing
 from symgen.symbols.symbolic_model import SymbolicModel
 
+FACTORED = 300  # terms of a determinant, up to which it is factored over the rationals
+
 
 def symbol(name: str) -> Any:
     """The real symbol of a name; pi is pi."""
@@ -40,6 +42,8 @@ def of_model(model: SymbolicModel) -> Any:
     if closed.denominator is not None:
         below = of_closed(closed.denominator, angles)
         values = {place: x / below for place, x in values.items()}
+    if model.model.name == "determinant" and closed.size <= FACTORED:
+        values = {place: sympy.factor(x) for place, x in values.items()}
     return _shaped(model, values)
 
 

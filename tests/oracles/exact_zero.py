@@ -35,17 +35,13 @@ def are_zero(matrix) -> bool:
 def valued(expression, values, steps=()):
     """A SymPy scalar or Matrix at N states, (N, ...): `values` by name are numbers or (N,); `steps` are [(symbol, expression)] to compute first."""
     scalar = not hasattr(expression, "shape")
-    known = {sympy.Symbol(name, real=True): np.asarray(value) for name, value in values.items()}
-    for x, e in steps:
-        known[x] = _number(e, known)
     entries = [expression] if scalar else list(expression)
-    N = max((v.size for v in known.values()), default=1)
-    made = np.stack([np.broadcast_to(_number(e, known), (N,)) for e in entries], axis=-1)
+    free = set().union(*(e.free_symbols for e in entries), *(e.free_symbols for _, e in steps)) - {x for x, _ in steps}
+    used = sorted(free, key=str)
+    known = [np.asarray(values[str(x)]) for x in used]
+    function = sympy.lambdify(used, entries, "numpy", cse=lambda reduced: (list(steps), list(reduced)))
+    N = max((np.size(v) for v in values.values()), default=1)
+    made = np.stack([np.broadcast_to(e, (N,)) for e in function(*known)], axis=-1)
     if scalar:
         return made[:, 0]
     return made.reshape(N, *expression.shape)[..., 0] if expression.shape[1] == 1 else made.reshape(N, *expression.shape)
-
-
-def _number(e, known):
-    used = sorted(e.free_symbols, key=str)
-    return np.asarray(sympy.lambdify(used, e, "numpy")(*(known[x] for x in used)))

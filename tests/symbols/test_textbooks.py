@@ -224,6 +224,15 @@ def test_puma_of_craig() -> None:
     assert models.jacobian(frame=4)[3:, 3:] == Matrix([[0, 0, -s5], [0, -1, 0], [1, 0, c5]])  # axes of the wrist in frame 4
 
 
+def test_singularities_of_the_puma() -> None:
+    """Elbow, shoulder and wrist of a PUMA 560 are factors: a3 s3 + d4 c3 (up to signs of alpha), the reach from axis 1, s5."""
+    a2, a3, d4 = real("a2 a3 d4")
+    det = symgen.symbolic(CRAIG_PUMA).determinant()
+    elbow, reach = a3 * sin(q3) + d4 * cos(q3), a2 * cos(q2) + a3 * cos(q2 + q3) - d4 * sin(q2 + q3)
+    assert is_zero(det - a2 * elbow * reach * sin(q5)) or is_zero(det + a2 * elbow * reach * sin(q5))
+    assert len(det.as_ordered_factors()) >= 4
+
+
 def test_determinant_of_khalil() -> None:
     """[K] chapter 5: singularities of the RX-90, det J = -D3 RL4 c3 s5 (s23 RL4 - c2 D3)."""
     RL4 = real("RL4")
