@@ -1,0 +1,311 @@
+"""The reader of counts: its linear algebra against dense NumPy, its moments against SciPy, its states against motions known in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from campaign import campaign
+from planar_data import motion
+from scipy.stats import truncnorm
+
+import symgen
+from runtime import load_model
+from runtime.errors import InputError, SettingsError
+from runtime.observation.count_smoother import box_moments
+from runtime.observation.counts import MARGIN, STRETCH, read_counts, stretches
+from runtime.observation.encoder_advice import encoder_sentences
+from runtime.observation.encoder_lattice import lattice
+from runtime.observation.filters import filtered_states
+from runtime.observation.observation import decimated_torque, observation_from_states, observe
+from runtime.observation.rows import select_rows
+from runtime.observation.spline_posterior import Basis, Factor
+from runtime.observation.states import certain_rows, observed_states
+from runtime.records.datasets import dataset_study
+from runtime.records.reading import read_records
+from runtime.records.record import Record
+from runtime.records.stream import RecordStream
+from runtime.settings.study import Lowpass, Rows, Signals, Study, study_from_mapping
+
+RATE = 2000.0
+T = np.arange(8000) / RATE
+W1, W2 = 2 * np.pi * 0.7, 2 * np.pi * 2.3
+
+
+def moved():
+    """q, qd, qdd of two joints, rad: sums of two sinusoids, which rest nowhere for long."""
+    shift = np.array([0.0, 1.0])
+    a, b = W1 * T[:, None] + shift, W2 * T[:, None] + 2 * shift
+    return (
+        np.sin(a) + 0.2 * np.sin(b),
+        W1 * np.cos(a) + 0.2 * W2 * np.cos(b),
+        -(W1**2) * np.sin(a) - 0.2 * W2**2 * np.sin(b),
+    )
+
+
+def counted(q, step, seed=3):
+    phase = np.random.default_rng(seed).random(q.shape[1]) * step
+    return np.round((q - phase) / step) * step + phase
+
+
+def test_the_posterior_is_that_of_dense_linear_algebra():
+    """Precision, solution and the band of the inverse of two channels, with knots every 3 samples, against numpy.linalg on the written-out system."""
+    rng = np.random.default_rng(0)
+    basis = Basis(100, 2, 3, 0.1)
+    tau, nu = rng.random((2, 2, basis.padded))
+    density = 1 + rng.random((2, basis.M))
+    factor = Factor.of(basis.precision(tau, density))
+    c = factor.solve(basis.gradient(nu, density, np.zeros((2, basis.P))))
+    Z = factor.inverse()
+    rows = np.zeros((basis.padded, basis.P))
+    jerk = np.zeros((basis.M, basis.P))
+    for i in range(basis.M):
+        jerk[i, i : i + 4] = np.array([-1, 3, -3, 1]) / basis.h**3
+        for u in range(basis.m):
+            rows[i * basis.m + u, i : i + 4] = basis.values[0][u]
+    for j in range(2):
+        A = rows.T @ (tau[j][:, None] * rows) + jerk.T @ (basis.h / density[j][:, None] * jerk)
+        dense = np.linalg.inv(A)
+        np.testing.assert_allclose(c[j], dense @ rows.T @ nu[j], rtol=1e-7, atol=1e-9)
+        for lag in range(4):
+            np.testing.assert_allclose(Z[lag, j, : basis.P - lag], np.diag(dense, lag), rtol=1e-7, atol=1e-10)
+        np.testing.assert_allclose(basis.variances(Z)[j], np.einsum("ka,ab,kb->k", rows, dense, rows), rtol=1e-7)
+
+
+def test_the_basis_is_differentiated():
+    """Values and derivatives of a random spline against central differences of its values."""
+    basis = Basis(4000, 1, 400, 1e-3)
+    c = np.random.default_rng(1).standard_normal((1, basis.P))
+    x, v, a = (basis.at_samples(c, order)[0] for order in range(3))
+    np.testing.assert_allclose(np.gradient(x, 1e-3)[1:-1], v[1:-1], atol=2e-3 * np.abs(v).max())
+    np.testing.assert_allclose(np.gradient(v, 1e-3)[1:-1], a[1:-1], atol=2e-2 * np.abs(a).max())
+
+
+@pytest.mark.parametrize(("a", "b"), [(-0.5, 0.5), (-3.0, -1.0), (2.0, 5.0), (6.0, 9.0), (-40.0, 0.3), (-0.2, 40.0)])
+def test_moments_of_a_box_are_those_of_a_truncated_normal(a, b):
+    g, H = box_moments(np.array([a]), np.array([b]))
+    mean, variance = truncnorm.stats(a, b, moments="mv")
+    np.testing.assert_allclose([g[0], 1 - H[0]], [mean, variance], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("per_turn", [20000, 2000, 200])
+def test_deviations_are_true_at_every_speed(per_turn):
+    """From several counts a sample to some twenty samples a count: errors are as large as stated, and far below those of the low-pass."""
+    q, qd, _ = moved()
+    step = 2 * np.pi / per_turn
+    reading = read_counts(counted(q, step), RATE, step)
+    inner = slice(200, -200)
+    z = np.array([((x - truth)[inner] / s[inner]) for x, s, truth in ((reading.q, reading.s_q, q), (reading.qd, reading.s_qd, qd))])
+    rms = np.sqrt((z**2).mean(axis=1))
+    assert ((rms > 0.3) & (rms < 1.5)).all(), rms
+    low = filtered_states(counted(q, step), RATE, Signals(median=1, lowpass=Lowpass(cutoff=50)))
+    error, before = (np.sqrt(((x - qd)[inner] ** 2).mean()) for x in (reading.qd, low.qd))
+    assert error < before / 1.5
+    assert (np.abs(reading.sign[np.abs(qd) > 6 * reading.s_qd]) > 0.99).all()
+
+
+def test_draws_have_the_stated_deviation():
+    q, _, _ = moved()
+    reading = read_counts(counted(q, 0.01), RATE, 0.01)
+    draws = np.array([reading.draw(np.random.default_rng(k)) for k in range(20)])
+    ratio = np.sqrt(((draws - reading.q) ** 2).mean(axis=0)) / reading.s_q
+    assert abs(float(ratio.mean()) - 1) < 0.05
+
+
+def test_missing_samples_are_bridged():
+    q, qd, _ = moved()
+    position = counted(q, 2e-3)
+    position[1000:1040] = np.nan
+    reading = read_counts(position, RATE, 2e-3)
+    assert np.isfinite(reading.qd).all()
+    assert (np.abs(reading.qd - qd)[1000:1040] < 6 * reading.s_qd[1000:1040]).all()
+    assert reading.s_q[1020].max() > 1.5 * reading.s_q[900:950].max()
+
+
+def test_step_and_phase_come_from_the_record():
+    q, _, _ = moved()
+    position = counted(q, 2 * np.pi / 1000) + 1e-14 * np.random.default_rng(0).standard_normal(q.shape)
+    known = lattice(position)
+    np.testing.assert_allclose(known.step, 2 * np.pi / 1000, rtol=1e-9)
+    cells = (position - known.phase) / known.step
+    np.testing.assert_allclose(cells, np.round(cells), atol=1e-6)
+    assert "steps from the record" in known.findings[0]
+
+
+def test_a_step_that_is_a_fraction_of_the_true_one_is_told():
+    q, _, _ = moved()
+    known = lattice(counted(q, 0.01), 0.005)
+    np.testing.assert_allclose(known.step, 0.01)
+    assert "not 0.005" in known.findings[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "step", "words"),
+    [
+        (lambda q: q + 0.003 * np.sin(40 * T)[:, None], 0.01, "off the lattice"),
+        (lambda q: q, 0.013, "off the lattice"),
+        (lambda q: q, 0.0, "expected a positive number"),
+        (lambda q: q, 40.0, "larger than its motion"),
+        (lambda q: 0 * q, None, "no position changes"),
+        (lambda q: np.where(np.arange(len(q))[:, None] < 3000, q, q - 123 * 0.01), 0.01, "jumps by"),
+    ],
+)
+def test_what_are_no_counts_is_refused(change, step, words):
+    q, _, _ = moved()
+    with pytest.raises(InputError, match=words):
+        read_counts(change(counted(q, 0.01)), RATE, step)
+
+
+def test_counts_that_wrap_are_unwrapped_and_told():
+    q, _, _ = moved()
+    straight = counted(q, 1e-4)
+    wrapped = straight.copy()
+    wrapped[:, 0] = 1e-4 * ((np.round(straight[:, 0] / 1e-4) + 2**16 - 3000) % 2**16)
+    assert np.abs(np.diff(wrapped[:, 0])).max() > 6
+    reading = read_counts(wrapped, RATE, 1e-4)
+    assert any("wraps at 2^16" in text for text in reading.findings)
+    moved_by = reading.q[:, 0] - read_counts(straight, RATE, 1e-4).q[:, 0]
+    np.testing.assert_allclose(moved_by, moved_by[0], atol=1e-4)
+
+
+def test_an_encoder_at_rest_is_told():
+    q, _, _ = moved()
+    position = counted(q, 0.01)
+    position[:, 1] = 0.03
+    reading = read_counts(position, RATE, 0.01)
+    assert "encoder 2: the count never changes" in reading.findings[0]
+    assert not reading.qd[:, 1].any() and np.allclose(reading.s_q[:, 1], 0.01 / np.sqrt(12))
+
+
+def test_uneven_lines_are_detected_and_estimated():
+    """A pattern of period four and 0.1 steps: told, its bounds widened; estimated, most of it is gone."""
+    q, _, _ = moved()
+    step, shift = 0.01, 0.1 * np.array([1.0, -1.2, 0.9, -0.7])
+    numbers = np.arange(-200, 200)
+    edges = np.sort(numbers + 0.5 + shift[numbers % 4])
+    position = step * (-200 + np.searchsorted(edges, q / step))
+    errors = {}
+    for lines in (0.01, "detected", "estimated"):
+        reading = read_counts(position, RATE, step, lines=lines)
+        errors[lines] = np.sqrt(((reading.q - q - np.mean(reading.q - q, axis=0)) ** 2).mean())
+        if lines != 0.01:
+            assert any("lines uneven" in text for text in reading.findings), lines
+    assert errors["estimated"] < 0.6 * errors["detected"] and errors["detected"] < 1.05 * errors[0.01], errors
+    assert not read_counts(counted(q, step), RATE, step).findings
+
+
+@pytest.fixture(scope="module")
+def planar():
+    return symgen.model("planar_2r")
+
+
+@pytest.fixture(scope="module")
+def record(planar):
+    states = motion(np.arange(8000) / 1000.0)
+    torque = planar.inverse_dynamics(*states, planar.base_parameters(planar.VALUES))
+    return Record(np.arange(8000) / 1000.0, counted(states[0], 5e-3), torque, rate=1000.0)
+
+
+STUDY = Study(signals=Signals(lowpass=Lowpass(cutoff=20), reader="counts", step=5e-3), rows=Rows(trim=20))
+
+
+def test_rows_of_uncertain_direction_are_left_out(planar, record):
+    observation = observe(planar, record, STUDY)
+    states = observed_states(planar, record.q, record.rate, STUDY.signals)
+    k = select_rows(record, states.qd, STUDY.signals, STUDY.rows).kept
+    slow = np.abs(states.qd[k]) < states.errors.deviation[k]
+    names = [name for name in planar.BASE_PARAMETERS if name.startswith("FS")]
+    assert names and observation.dropped["direction"] == tuple(int(n) for n in slow[20:-20].sum(axis=0)) and slow[20:-20].any()
+
+
+def test_by_blocks_as_a_whole(planar, record, monkeypatch):
+    monkeypatch.setattr("runtime.observation.counts.STRETCH", 3000)
+    whole, blocks = observe(planar, record, STUDY), observe(planar, RecordStream(record, 700), STUDY)
+    assert whole.rows == blocks.rows and whole.dropped == blocks.dropped
+    np.testing.assert_allclose(blocks.W, whole.W, atol=1e-6 * np.abs(whole.W).max())
+
+
+def test_stretches_cover_the_record_once():
+    for N in (10, STRETCH, STRETCH + 1, 5 * STRETCH // 2, 1_000_000):
+        parts = stretches(N)
+        assert [p[1] for p in parts] == [0, *(p[2] for p in parts[:-1])] and parts[-1][2] == N
+        assert all(begin == max(first - MARGIN, 0) and end == min(stop + MARGIN, N) for begin, first, stop, end in parts)
+
+
+def test_encoders_on_the_motors_of_a_coupled_wrist():
+    """Motor 6 sees q5 and q6: six encoders of 200 lines on the motors, read there, say joints to the step over the ratio."""
+    model = load_model("tx40")
+    drives = {key: np.array(value) for key, value in model.DRIVES.items() if key != "torque_constant"}
+    t = np.arange(3000) / 1000.0
+    q = 0.4 * np.sin(2 * np.pi * 0.6 * t[:, None] + np.arange(6)) + drives["offset"]
+    step = 2 * np.pi / 50
+    motor = np.round((q - drives["offset"]) @ drives["ratio"].T / step) * step
+    joint = motor @ np.linalg.inv(drives["ratio"]).T + drives["offset"]
+    signals = Signals(lowpass=Lowpass(cutoff=20), reader="counts", step=step, side="motor")
+    states = observed_states(model, joint, 1000.0, signals)
+    exact = filtered_states(q, 1000.0, replace(signals, median=1))
+    worth = [
+        np.sqrt(((x.qd - exact.qd)[100:-100] ** 2).mean(axis=0))
+        for x in (states, filtered_states(joint, 1000.0, Signals(lowpass=Lowpass(cutoff=20))))
+    ]
+    assert (worth[0] < worth[1] / 2).all()
+    np.testing.assert_allclose(states.errors.root @ drives["ratio"], np.eye(6), atol=1e-12)
+    with pytest.raises(InputError, match="off the lattice"):
+        observed_states(model, joint, 1000.0, replace(signals, side="joint"))
+
+
+def test_settings_of_counts_need_the_reader():
+    with pytest.raises(SettingsError, match="reader: counts"):
+        Signals(step=0.01)
+
+
+def test_a_record_that_counts_would_help_is_told(planar, record):
+    positions = replace(STUDY.signals, reader="lowpass", step=None)
+    (text,) = encoder_sentences(planar, record, positions)
+    assert "reader: counts" in text and "0.005" in text
+    fine = Record(record.t, counted(motion(record.t)[0], 1e-6), record.tau, rate=1000.0)
+    assert encoder_sentences(planar, fine, positions) == ()
+
+
+@campaign
+def test_measured_record_at_a_coarse_step(tx40_data):
+    """2 pi/1000 at the joints: main parameters within 2 % rms of those of the record on the same rows, low-pass above 20 %."""
+    model, study = load_model("tx40"), study_from_mapping(dataset_study("tx40"))
+    full = read_records(study.record, model)[0]
+    step = 2 * np.pi / 1000
+    main = [
+        "ZZ1R",
+        "FV1",
+        "FS1",
+        "XX2R",
+        "ZZ2R",
+        "MX2R",
+        "FV2",
+        "FS2",
+        "MY3R",
+        "Ia3",
+        "FV3",
+        "FS3",
+        "Ia4",
+        "FV4",
+        "FS4",
+        "Ia5",
+        "FV5",
+        "FS5",
+        "FV6",
+    ]
+    q = counted(full.q, step)
+    signals = replace(study.signals, reader="counts", step=step)
+    read = observed_states(model, q, full.rate, signals)
+    keep = certain_rows(model, read).T
+
+    def fitted(states):
+        selection = select_rows(full, states.qd, study.signals, study.rows, keep=keep)
+        rows = observation_from_states(model, replace(states, errors=None), decimated_torque(full.tau, selection), selection)
+        X, *_ = np.linalg.lstsq(rows.W / np.linalg.norm(rows.W, axis=0), rows.Y, rcond=None)
+        return (X / np.linalg.norm(rows.W, axis=0))[[model.BASE_PARAMETERS.index(name) for name in main]]
+
+    reference = fitted(filtered_states(full.q, full.rate, study.signals))
+    by_counts, by_positions = (
+        np.sqrt(np.mean((fitted(states) / reference - 1) ** 2)) for states in (read, filtered_states(q, full.rate, study.signals))
+    )
+    assert by_counts < 0.02 and by_positions > 0.2
