@@ -29,8 +29,10 @@ Lines = Literal["detected", "estimated"] | float
 
 KNOTS = 2e-3
 """Distance of knots, s, or of samples where that is larger."""
-PASSES, FIRST = 12, 6
-"""Most passes over the sites, and passes over the changes alone ahead of them."""
+PASSES, FIRST = 12, 30
+"""Most passes over the sites, and over the changes alone ahead of them."""
+SETTLED = 0.1
+"""Relative change of the jerk density at which the passes over the changes end."""
 DAMPING = 0.5
 CHANGE = 0.02
 """Relative change of the precisions at which passes end."""
@@ -89,7 +91,7 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
     density = np.full((n, basis.M), _first_density(y[:, :N]))
     tau, nu, c, density = _passed(basis, tau, nu, density, np.zeros((n, basis.P)))
     if isinstance(lines, str):
-        errors = line_errors(basis, y, known, c, density, Ts, estimate=lines == "estimated")
+        errors, density = line_errors(basis, y, known, c, density, Ts, estimate=lines == "estimated")
         if any(each.deviation > LINES for each in errors):
             tau, nu = _from_changes(y, known, errors)
             tau, nu, c, density = _passed(basis, tau, nu, density, c)
@@ -124,12 +126,14 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
 
 
 def _passed(basis: Basis, tau: Array, nu: Array, density: Array, c: Array) -> tuple[Array, Array, Array, Array]:
-    """The spline through Gaussian sites, and the jerk density that goes with it, after FIRST passes."""
+    """The spline through Gaussian sites, and the jerk density that goes with it, after at most FIRST passes."""
     for number in range(FIRST):
         for _ in range(2 if number == 0 else 1):
             factor = Factor.of(basis.precision(tau, density))
             c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), density, c))
-        density = _density(basis, c, factor.inverse(), density)
+        before, density = density.mean(axis=1), _density(basis, c, factor.inverse(), density)
+        if number > 2 and (np.abs(density.mean(axis=1) / before - 1) < SETTLED).all():
+            break
     return tau, nu, c, density
 
 
@@ -178,9 +182,11 @@ def _from_changes(y: Array, known: Array, errors: Sequence[LineErrors]) -> tuple
             continue
         before, after = at[e], at[e + 1]
         t, line = (before + after) / 2, (y[j, before] + y[j, after]) / 2
-        speed = (np.interp(t + 25, t, line) - np.interp(t - 25, t, line)) / 50  # steps a sample
+        slope = np.diff(line) / np.diff(t)  # steps a sample, from change to change
+        slopes = np.abs([np.append(slope[:1], slope), np.append(slope, slope[-1:])])
+        speed = 0.5 * (np.append(slope[:1], slope) + np.append(slope, slope[-1:]))
         line = line + errors[j].of(np.floor(line).astype(int))
-        weight = 6 / (np.clip(np.abs(speed) * (after - before), 0.02, 1) ** 2 + 12 * errors[j].left ** 2)
+        weight = 6 / (np.clip(slopes.max(axis=0) * (after - before), 0.02, 1) ** 2 + 12 * errors[j].left ** 2)
         for samples in (before, after):
             np.add.at(tau[j], samples, weight)
             np.add.at(nu[j], samples, weight * (line + (samples - t) * speed))

@@ -25,14 +25,17 @@ from runtime.observation.spline_posterior import Basis, Factor
 
 Array = np.ndarray
 
-SIZES = (0.01, 0.03, 0.06, 0.12, 0.25)
-"""Deviations of lines that are compared, steps."""
-COMPARED, CLEAR = 0.04, 5.0
-"""Deviation whose evidence is compared with that of even lines, and the difference that tells."""
+SIZES = (0.25, 0.12, 0.06, 0.03, 0.01)
+"""Deviations of lines that are compared, steps; the last counts as even."""
+COMPARED, CLEAR = (0.1, 0.03, 0.01), 0.03
+"""Deviations whose evidence is compared first, and the difference by change that tells."""
+WEAK = 0.06
+"""Precision of every count taken as a position, where no count changes: a hundredth of an interval's, since neighbours say the same."""
 PASSES = 3
 FEWEST = 50
 """Changes below which lines count as even."""
-CROSSINGS = 5
+CROSSINGS, ENOUGH = 5, 20
+"""Crossings from which a line is estimated by itself, and the number of such lines that tell how much they differ."""
 MOST = 1500
 """Lines of one encoder that are estimated one by one."""
 
@@ -76,22 +79,27 @@ class LineErrors:
         )
 
 
-def evidence(basis: Basis, changes: Sequence[Changes], c: Array, density: Array, e: float, Ts: float) -> tuple[Array, Array]:
-    """Log evidence of the changes of every encoder with lines of deviation e, shape (n,), and the jerk density that goes with it, shape (n, M)."""
-    speed = basis.at_samples(c, 1) * Ts
-    tau, nu = np.zeros((2, basis.n, basis.padded))
-    fixed = np.zeros(basis.n)
+def evidence(
+    basis: Basis, changes: Sequence[Changes], weak: tuple[Array, Array], speed: Array, density: Array, e: float, passes: int
+) -> tuple[Array, Array]:
+    """Log evidence of the changes of every encoder with lines of deviation e, shape (n,), and the jerk density that goes with it, shape (n, M).
+
+    weak : precisions of single samples and these times the counts, shape (n, m M) each, which hold the spline where no count changes.
+    speed : steps a sample, shape (n, m M).   density : where the passes of MacKay's rule start; from above they are few.
+    """
+    tau, nu = weak[0].copy(), weak[1].copy()
+    fixed = -0.5 * np.divide(nu**2, tau, out=np.zeros_like(nu), where=tau > 0).sum(axis=1)
     for j, each in enumerate(changes):
         w, value = _weights(each, speed[j], e)
         np.add.at(tau[j], each.before, w)
         np.add.at(nu[j], each.before, w * value)
-        fixed[j] = 0.5 * np.log(w).sum() - 0.5 * (w * value**2).sum()
-    r, zero = density, np.zeros_like(c)
-    for number in range(PASSES + 1):
+        fixed[j] += 0.5 * np.log(w).sum() - 0.5 * (w * value**2).sum()
+    r, zero = density, np.zeros((basis.n, basis.P))
+    for number in range(passes + 1):
         factor = Factor.of(basis.precision(tau, r))
         g = basis.gradient(nu, r, zero)
         c = factor.solve(g)
-        if number < PASSES:
+        if number < passes:
             squares, determined = basis.jerk(c) ** 2 * basis.h, 1 - basis.jerk_variances(factor.inverse()) * basis.h / r
             r = np.broadcast_to(squares.mean(axis=1, keepdims=True) / np.maximum(determined.mean(axis=1, keepdims=True), 1e-9), r.shape)
     halves = np.log(factor.L[0]).reshape(basis.n, -1).sum(axis=1) + 0.5 * np.log(r).sum(axis=1)
@@ -105,56 +113,73 @@ def _weights(changes: Changes, speed: Array, e: Array | float) -> tuple[Array, A
     return w, changes.line + (changes.before - changes.after) / 2 * s
 
 
-def line_errors(basis: Basis, y: Array, known: Array, c: Array, density: Array, Ts: float, *, estimate: bool) -> list[LineErrors]:
-    """Size of the errors of the lines of every encoder, and their places where `estimate` asks for them.
+def line_errors(
+    basis: Basis, y: Array, known: Array, c: Array, density: Array, Ts: float, *, estimate: bool
+) -> tuple[list[LineErrors], Array]:
+    """Size of the errors of the lines of every encoder, their places where `estimate` asks for them, and the jerk density without these errors.
 
     y, known, c, density : as in `runtime.observation.count_smoother`, c from the changes alone.
     """
     changes = [Changes.of(y[j], known[j]) for j in range(basis.n)]
-    judged = {e: evidence(basis, changes, c, density, e, Ts) for e in (SIZES[0], COMPARED)}
-    uneven = (judged[COMPARED][0] > judged[SIZES[0]][0] + CLEAR) & np.array([len(each.line) >= FEWEST for each in changes])
+    weak = np.where(known, WEAK, 0.0), np.where(known, WEAK * y, 0.0)
+    speed = basis.at_samples(c, 1) * Ts
+
+    def judged(sizes: Sequence[float]) -> dict[float, tuple[Array, Array]]:
+        found, r = {}, np.broadcast_to(density.mean(axis=1, keepdims=True), density.shape)
+        for number, e in enumerate(sizes):
+            found[e] = evidence(basis, changes, weak, speed, r, e, PASSES if number else 2 * PASSES)
+            r = found[e][1]
+        return found
+
+    first = judged(COMPARED)
+    best = np.max([first[e][0] for e in COMPARED[:-1]], axis=0)
+    crossings = np.array([len(each.line) for each in changes])
+    uneven = (best > first[SIZES[-1]][0] + CLEAR * crossings) & (crossings >= FEWEST)
     if not uneven.any():
-        return [LineErrors(SIZES[0], 0, np.zeros(0), SIZES[0])] * basis.n
-    judged |= {e: evidence(basis, changes, c, density, e, Ts) for e in SIZES[1:]}
-    errors = []
+        return [LineErrors(SIZES[-1], 0, np.zeros(0), SIZES[-1])] * basis.n, density
+    all_sizes, errors, densities = judged(SIZES), [], density.copy()
     for j, each in enumerate(changes):
-        deviation = max(judged, key=lambda e: float(judged[e][0][j])) if uneven[j] else SIZES[0]
-        if deviation == SIZES[0] or not estimate:
-            text = f"lines uneven by {deviation:g} steps (rms); bounds are widened" if uneven[j] else ""
+        deviation = max(all_sizes, key=lambda e: float(all_sizes[e][0][j])) if uneven[j] else SIZES[-1]
+        if deviation > SIZES[-1]:
+            densities[j] = all_sizes[deviation][1][j]
+        if deviation == SIZES[-1] or not estimate:
+            text = f"lines uneven by {deviation:g} steps (rms); bounds are widened" if deviation > SIZES[-1] else ""
             errors.append(LineErrors(deviation, 0, np.zeros(0), deviation, text))
         else:
             alone = Basis(basis.N, 1, basis.m, Ts)
-            r = judged[deviation][1][j : j + 1]
-            first, shift, left, single = _shifts(alone, each, c[j : j + 1], r, deviation, Ts)
+            rows = slice(j, j + 1)
+            place, shift, left, single = _shifts(alone, each, (weak[0][rows], weak[1][rows]), speed[j], densities[rows], deviation)
             text = f"lines uneven by {deviation:g} steps (rms); period of four and {single} single lines estimated, {left:.2g} steps left"
-            errors.append(LineErrors(deviation, first, shift, left, text))
-    return errors
+            errors.append(LineErrors(deviation, place, shift, left, text))
+    return errors, densities
 
 
-def _shifts(basis: Basis, changes: Changes, c: Array, density: Array, deviation: float, Ts: float) -> tuple[int, Array, float, int]:
+def _shifts(
+    basis: Basis, changes: Changes, weak: tuple[Array, Array], speed: Array, density: Array, deviation: float
+) -> tuple[int, Array, float, int]:
     """Shifts of all lines from the first one crossed on, the deviation left, and how many lines have a shift of their own."""
     first, last = int(changes.number.min()), int(changes.number.max())
     place = changes.number - first
     size = last - first + 1
     ups, downs = np.bincount(place[changes.up], minlength=size), np.bincount(place[~changes.up], minlength=size)
     own = np.flatnonzero((ups + downs >= CROSSINGS) & (ups > 0) & (downs > 0))[:MOST]
+    own = own if len(own) >= ENOUGH else own[:0]
     classes = np.full(size, -1)
     classes[own] = np.arange(len(own))
     quadrature = len(own) + np.arange(size) % 4
     shift, left = np.zeros(size), deviation
     # lines of no class of their own keep e in their weight; those of a class have time alone
     of = classes[place]
-    w, value = _weights(changes, basis.at_samples(c, 1)[0] * Ts, SIZES[0])
+    w, value = _weights(changes, speed, SIZES[-1])
     time = 1 / w
     variance_own = variance_period = deviation**2 / 2
     for _ in range(4):
         w = 1 / (time + np.where(of >= 0, 0.0, variance_own))
-        tau, nu = np.zeros((1, basis.padded)), np.zeros((1, basis.padded))
+        tau, nu = weak[0].copy(), weak[1].copy()
         np.add.at(tau[0], changes.before, w)
         np.add.at(nu[0], changes.before, w * value)
         factor = Factor.of(basis.precision(tau, density))
-        zero = np.zeros_like(c)
-        g = basis.gradient(nu, density, zero)
+        g = basis.gradient(nu, density, np.zeros((1, basis.P)))
         count = len(own) + 4
         B, W, y = np.zeros((basis.P, count)), np.zeros((count, count)), np.zeros(count)
         member = np.zeros((len(w), 2), dtype=int)
@@ -181,4 +206,4 @@ def _shifts(basis: Basis, changes: Changes, c: Array, density: Array, deviation:
     unknown = np.ones(len(place)) * variance_own
     unknown[of >= 0] = np.diag(C)[of[of >= 0]]
     left = float(np.sqrt(np.mean(unknown)))
-    return first, shift, max(left, SIZES[0]), len(own)
+    return first, shift, max(left, SIZES[-1]), len(own)
