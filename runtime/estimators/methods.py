@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from runtime.errors import SettingsError
+from runtime.errors import InputError, SettingsError
 from runtime.estimators import cloe, didim, feasible, irls, iv, ols, tls, wls
 from runtime.estimators.closed_loop import LoopSimulator, closed_loop
 from runtime.estimators.estimate import Estimate
@@ -199,6 +199,10 @@ def observed(
         Closed loop that made the records.
     """
     settings, several = study.estimate, list(records) if isinstance(records, Sequence) else [records]
+    for record in several:
+        if record.n != len(model.JOINTS):
+            message = f"{record.n} joints; {model.NAME} has {len(model.JOINTS)}: a record of another robot, or of some of its joints"
+            raise InputError(message, file=", ".join(record.files) or record.name)
     whole = [record for record in several if isinstance(record, Record)]
     method = method_of(settings)
     if len(whole) < len(several) and (simulator is not None or settings.method == "tls"):

@@ -178,7 +178,8 @@ def checklist_of(
     """
     checks = [determined(estimate, fit), *plausible]
     if estimate.status != "rank-deficient":
-        checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error)]
+        differ = homogeneity is not None and homogeneity.largest > RELEVANT
+        checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error, differ=differ)]
         checks += [] if homogeneity is None else [agreeing(homogeneity)]
         checks += [signs(negative), certain(fit, bootstrap), separate(fit)]
         checks += [physical(fit if "standard" in fit.details else estimate, feasibility), resolved(advice)]
@@ -245,15 +246,17 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
     )
 
 
-def predicted(fit: Estimate, error: float) -> Check:
-    """Largest relative error, %, on data that did not give the parameters; open where it is nan."""
+def predicted(fit: Estimate, error: float, *, differ: bool = False) -> Check:
+    """Largest relative error, %, on data that did not give the parameters; open where it is nan. differ : records disagree by more than RELEVANT."""
     limits = [min(max(times * fit.relative_error, least), most) for (times, least), most in zip(PREDICTION, UNSEEN, strict=True)]
     return Check(
         "Does it predict data it has not seen?",
         _state(error, *limits) if np.isfinite(error) else "open",
         f"{error:.1f} % stay unexplained there, {fit.relative_error:.1f} % where it was fitted",
         f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
-        "fewer parameters (a larger essential.threshold), a longer or richer record",
+        "see in which parameters the records differ: another robot, load or wiring, or a motion that one of them does not excite"
+        if differ
+        else "fewer parameters (a larger essential.threshold), a longer or richer record",
     )
 
 

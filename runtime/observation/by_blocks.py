@@ -18,7 +18,7 @@ from runtime.model.generated import GeneratedModel
 from runtime.observation.counts_by_blocks import CountStage
 from runtime.observation.filters import SpeedErrors, States, decimation_factor, decimation_plan, kept_samples
 from runtime.observation.regressor_signals import DistinctSignals, Entries
-from runtime.observation.rows import per_joint
+from runtime.observation.rows import nothing_left, per_joint
 from runtime.observation.states import certain_rows, encoder_drives, encoder_position, encoder_root
 from runtime.observation.streaming_filters import (
     Chain,
@@ -99,7 +99,7 @@ def layout(model: GeneratedModel, stream: Stream, study: Study, constants: Mappi
     if signals.reader == "counts":
         dropped["direction"] = tuple((fast - counts).tolist())
     if not counts.any():
-        raise InputError(f"no row is left: {dropped} rows per joint were left out of {K}", file=stream.name)
+        raise InputError(nothing_left(dropped, K), file=stream.name)
     return replace(at, rows=tuple(counts.tolist()), shown=tuple(shown.tolist()), dropped=dropped)
 
 

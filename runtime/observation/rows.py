@@ -5,7 +5,7 @@ The choice is made once, on the measured record, and shared by every run of a st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,8 @@ from runtime.records.record import Record
 from runtime.settings.study import Rows, Signals
 
 Array = np.ndarray
+
+LEAVES_OUT = {"trim": "rows.trim", "low_speed": "rows.low_speed", "mask": "the choice of samples"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +62,14 @@ def select_rows(record: Record, qd: Array, signals: Signals, rows: Rows, *, keep
         mask &= usable
         dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
     if not mask.any():
-        raise InputError(f"no row is left: {dropped} rows per joint were left out of {len(kept)}", file=record.file)
+        raise InputError(nothing_left(dropped, len(kept)), file=record.file)
     return Selection(samples, kept, mask, factor, record.t[instants], record.rate / factor, signals, rows, dropped)
+
+
+def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
+    """Why none of the K rows of every joint is used, in words. dropped : rows left out by reason and joint."""
+    left_out = ", ".join(f"{LEAVES_OUT.get(reason, reason)} leaves out {max(counts)}" for reason, counts in dropped.items() if any(counts))
+    return f"none of its {K} rows per joint is used: {left_out}; choose these settings anew, or leave this record out"
 
 
 def _window(record: Record, rows: Rows) -> slice:

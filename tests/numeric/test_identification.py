@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import runtime
+from runtime import InputError
 from runtime.identification.assessment import assess
 from runtime.records.provenance import origin, record_names
 from runtime.records.stream import RecordStream
@@ -126,3 +127,39 @@ def test_torques_that_are_currents_are_asked_about(model):
     assert not any(
         "currents" in sentence for sentence in runtime.identify(bare, runtime.Record(record.t, record.q, record.tau / 12)).warnings
     )
+
+
+def test_records_that_do_not_belong_together_are_told_in_a_sentence(model):
+    """A record with other joints, one of another robot, and one that rests."""
+    record = measured(model, 1)
+    other = runtime.Record(
+        record.t, np.column_stack([record.q, record.q[:, :1]]), np.column_stack([record.tau, record.tau[:, :1]]), name="other"
+    )
+    for given in ({"records": other}, {"records": record, "further": [other]}):
+        with pytest.raises(InputError, match="other: 3 joints; planar_2r has 2: a record of another robot"):
+            runtime.identify(model, study=STUDY, **given)
+    still = replace(record, q=np.tile(record.q[:1], (len(record), 1)), name="still")
+    moving = replace(STUDY, rows=replace(STUDY.rows, low_speed=0.01))
+    with pytest.raises(
+        InputError, match=r"still: none of its \d+ rows per joint is used: rows.trim leaves out 3?\d, rows.low_speed leaves out"
+    ):
+        runtime.identify(model, [record, still], moving)
+    heavier = replace(measured(model, 2), tau=3 * measured(model, 2).tau, name="heavier")
+    result = runtime.identify(model, record, STUDY, further=[heavier])
+    assert result.checklist.state == "no" and not result.homogeneity.agree
+    assert "another robot, load or wiring" in result.checklist.next
+
+
+def test_the_status_of_every_method_decides(model):
+    """Not converged is no value, whatever the rest says."""
+    result = runtime.identify(model, measured(model, 1), STUDY)
+    assert (
+        result.usable
+        and list(result.sets) == ["essential", "all", "feasible"]
+        and result.ranking.startswith("Predicts a part of the record")
+    )
+    bad = replace(
+        result, estimate=replace(result.estimate, status="not-converged", message="DIDIM has not converged after 3 passes. More.")
+    )
+    assert not bad.usable and bad.checklist.state == "no"
+    assert bad.verdict == "No values of planar_2r: ols ended with status not-converged. DIDIM has not converged after 3 passes."

@@ -301,7 +301,7 @@ def test_stack_refuses(record):
         ({"rows": {"window": [10, 20]}}, "no sample in rows.window [10.0, 20.0] s; the record spans [0, 5.999] s"),
         ({"rows": {"window": [0, 0.02], "trim": 0}}, "needs more than 27"),
         ({"rows": {"trim": 400}}, "rows.trim leaves out 800"),
-        ({"rows": {"low_speed": 100}}, "no row is left"),
+        ({"rows": {"low_speed": 100}}, "rows per joint is used: rows.trim leaves out"),
         ({"rows": {"low_speed": [1, 2, 3]}}, "rows.low_speed has 3 values; expected one or 2"),
         ({"signals": {"lowpass": {"cutoff": 500}}}, "Nyquist"),
     ],
