@@ -46,7 +46,11 @@ def test_motion_from_a_record(study: Path, tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     summary = json.loads((out / "excitation.json").read_text())
     assert json.loads(done.stdout) == summary
-    assert summary["cond"] < summary["cond_of_record"]
+    before = summary["relative_sigma_of_record"]
+    assert summary["worse_than_record"] == {
+        k: x / before[k] for k, x in sorted(summary["relative_sigma"].items(), key=lambda i: -i[1] / before[i[0]]) if x > before[k]
+    }
+    assert summary["settings"]["criterion"] == "record"
     assert max(max(x) for x in summary["limits_used"].values()) <= 1
     assert {p.name for p in out.iterdir()} == {"report.html", "excitation.json", "trajectory.csv", "motion.yaml", "motion.png"}
     table = np.genfromtxt(out / "trajectory.csv", delimiter=",", names=True)

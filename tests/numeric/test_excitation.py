@@ -177,7 +177,11 @@ def test_a_record_gives_parameters_and_a_motion_to_compare_with(planar: tuple) -
     summary = found.summary()
     assert summary["parameters_from"] == "estimate of slow" and summary["cond_of_record"] == found.known.condition
     assert set(found.relative_sigma) == set(found.known.relative_sigma) == {"ZZ1R", "ZZ2", "FV1", "FV2"}
-    assert found.condition < found.known.condition
+    ratios = [found.relative_sigma[name] / found.known.relative_sigma[name] for name in found.relative_sigma]
+    assert max(ratios) < 1 and found.worse == {} and "better than the motion of the record" in found.verdict
+    assert excite(model, record, replace(STUDY, excitation=replace(asked, criterion="cond"))).condition < found.known.condition
+    idle = replace(found, relative_sigma={**found.relative_sigma, "ZZ2": 3 * found.known.relative_sigma["ZZ2"]})
+    assert list(idle.worse) == ["ZZ2"] and idle.worse["ZZ2"] == pytest.approx(3) and "WORSE: ZZ2" in idle.verdict
     assert "motion of the record" in str(found) and found.to_csv().startswith("t,q1,q2,qd1,qd2,qdd1,qdd2\n")
 
 
