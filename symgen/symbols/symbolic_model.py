@@ -186,9 +186,9 @@ class SymbolicModel:
                 f"the Jacobian of {robot.name} is 6 x {n}: no rows of it make a square matrix; take jacobian, and det(J*J.T) in SymPy"
             )
         path = robot.path(self.request.of)
-        if n == 6 and self.rows is None and not self.source.closure.tied:
-            last = [j for j in path if set(robot.joints) <= set(robot.path(j))]
-            pairs = [(j, i) for j in last for i in (0, *path)] or [(self.request.of, self.request.frame)]
+        if n == 6 and self.rows is None and self.request.of:
+            moving = {j for j in path if j in robot.moving}
+            pairs = [(j, i) for j in path if moving <= set(robot.path(j)) for i in (0, *path)]  # every j is on the last link
         else:
             pairs = [(self.request.of, self.request.frame)]
         for j, i in pairs:
