@@ -37,6 +37,12 @@ ROBOTS = {
 LOOPS = {name: symgen.load_robot(name) for name in ("four_bar", "five_bar")}  # passive joints are symbols
 SLOW = [name if name in ("planar_2r", "emps", "emps_asymmetric") else pytest.param(name, marks=campaign) for name in ROBOTS]
 
+IDENTITIES = [("planar_2r", "base"), ("emps_asymmetric", "standard")]
+IDENTITIES += [
+    pytest.param(name, kind, marks=campaign)
+    for name, kind in (("planar_2r", "standard"), ("rpr", "base"), ("rpr", "standard"), ("haptic", "base"))
+]
+
 
 def real(name: str):
     return sympy.Symbol(name, real=True)
@@ -98,8 +104,7 @@ def test_lagrange(name: str) -> None:
     assert are_zero(models.inverse_dynamics() - models.friction() - gamma)
 
 
-@pytest.mark.parametrize("kind", ["base", "standard"])
-@pytest.mark.parametrize("name", SLOW)
+@pytest.mark.parametrize(("name", "kind"), IDENTITIES)
 def test_identities(name: str, kind: str) -> None:
     """A is symmetric and d2E/dqd2; Ad - 2C is skew symmetric; dU/dq = Q; Gamma = A qdd + C qd + Q + friction = D chi; H = Gamma at qdd = 0."""
     models = symbolic(ROBOTS[name], parameters=kind, passive="functions")

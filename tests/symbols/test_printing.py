@@ -69,7 +69,7 @@ def test_latex(name: str, model: str, form: str) -> None:
 @pytest.mark.parametrize("name", symgen.packaged_robots())
 def test_latex_of_every_model(name: str) -> None:
     """Every model of every robot in either form, or a sentence that says which form works."""
-    models = symbolic(name, limit=600)
+    models = symbolic(name, limit=300)
     for model in ALL:
         for form in ("closed", "recursive"):
             try:
