@@ -42,6 +42,7 @@ from runtime.records.record import Record
 from runtime.resolution.advice import ALL, LIMITS, Advice, EncoderAdvice, Limit, ReaderAdvice, Sampled, confirmed, crossing, sampled
 from runtime.resolution.perturbed import Task, prepared, study_columns, system_of
 from runtime.resolution.readers import LINES, READERS, real_encoders
+from runtime.resolution.readers import RATIO as STEPS
 from runtime.resolution.result import DECIDING, deciding_names
 from runtime.resolution.rounding import VARIANCE, rounded, stream
 from runtime.settings.study import Study, to_mapping
@@ -316,7 +317,8 @@ def assumptions(
         encoders.append(
             f"Real encoders: counts of steps Delta, lines {lines}, the phase random by encoder and run, {place}. The reader knows the step, not the phase. "
             f"Curves are a quadrature over the phase, without first order; steps of fewer than {LINES} in the motion of a joint are not judged. "
-            "Both estimates stand on the rows that the reader leaves in; rows in which dry friction has no certain direction are not among them."
+            "Both estimates stand on the rows that the reader leaves in; rows in which dry friction has no certain direction are not among them. Between "
+            f"the steps tried, in the ratio {STEPS:g}, a joint of constant speed may lock to the sampling and change more: ask for the step of the encoder itself."
         )
     return (
         *encoders,

@@ -59,6 +59,13 @@ def test_torque_steps_and_named_columns(emps_data):
         (["--rounding", "up"], ["cestac.rounding", "two-point"]),
         (["--side", "left"], ["cestac.side", "motor"]),
         (["--columns", "M9"], ["M9", "M1R"]),
+        (["--uneven", "0.1"], ["cestac.uneven", "rounding: phase"]),
+        (["--uneven", "0.6", "--rounding", "phase"], ["cestac.uneven", "0.5"]),
+        (["--reader", "counts"], ["cestac.rounding", "destroys the edges"]),
+        (["--reader", "edges"], ["signals.reader", "counts"]),
+        (["--place", "loop"], ["cestac.rounding", "phase alone"]),
+        (["--method", "best"], ["estimate.method", "didim"]),
+        (["--rounding", "phase", "--delta", "5e-8"], ["cestac.delta", "steps of 5e-08 itself"]),
     ],
 )
 def test_bad_options(emps_data, options, words):
