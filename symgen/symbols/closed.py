@@ -15,6 +15,7 @@ from symgen.derive.graph import Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.scalar import Turn
 from symgen.description.expression import ONE, Call, Expression, Monomial, call
+from symgen.errors import SymgenError
 from symgen.symbols.polynomial import BITS, ONES, Coefficient, Polynomial, Rank, Ring
 
 CONSTANT, SLIDE, RATE, DIRECTION, PARAMETER = (1,), (2,), (4,), (5,), (6,)  # ranks of factors; cosines and sines have (3, ...)
@@ -71,7 +72,12 @@ class Expansion:
         for node in algebra.graph.nodes:  # angles by which sums of products may be written shorter
             if node.index in algebra.angles and algebra.angles[node.index][0]:
                 turn, rest, _ = _forward(*algebra.angles[node.index])
-                self.ring.angle(turn, rest, str(node.name)[1:])
+                label = str(node.name)[1:]
+                for name in {f"C{label}", f"S{label}"} & {*algebra.robot.constants, *self.parameters}:
+                    raise SymgenError(
+                        f"two quantities would be called {name}; rename the constant or parameter of that name in the robot file"
+                    )
+                self.ring.angle(turn, rest, label)
 
     def of(self, outputs: Sequence[Scalar | int]) -> list[Polynomial]:
         """The polynomials of graph values, multiplied out."""

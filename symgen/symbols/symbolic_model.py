@@ -235,6 +235,8 @@ class SymbolicModel:
             )
         A = MODELS["inertia_matrix"].entries(d, self.request)  # type: ignore[misc]
         H = MODELS["bias"].entries(d, self.request)  # type: ignore[misc]
+        for name in {f"GAM{j}" for j in robot.joints} & {*robot.constants}:
+            raise SymgenError(f"two quantities would be called {name}; rename the constant of that name in the robot file")
         torques = [d.algebra.graph.symbol(f"GAM{j}") for j in robot.joints]
         expansion = Expansion(d.algebra, self.source.parameters, self.limit)
         ring = expansion.ring
