@@ -143,7 +143,7 @@ def tx40(methods: Sequence[str]) -> tuple[str, str]:
     options: Mapping[str, Mapping[str, Any]] = {
         "tls": {"position_error": ENCODER["tx40"], "bootstrap": 0},
         "iv": IV,
-        "feasible": {"bootstrap": 0},
+        "feasible": {"bootstrap": 0, "prior": "none", "reach": None},  # the conditions alone: the values of the robot file are from Table 2
     }
     found: dict[str, Estimate] = {}
     lines: list[Sequence[str]] = [("method", "status", *(f"joint {j} %" for j in model.JOINTS), "total %", "held out %")]

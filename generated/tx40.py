@@ -1,6 +1,6 @@
 """Stäubli TX40, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from tx40.yaml, sha256 fb8651f3f1d0, by symgen 0.2.0. Do not edit; symgen generate tx40
+GENERATED from tx40.yaml, sha256 1cd8e9c50efa, by symgen 0.2.0. Do not edit; symgen generate tx40
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta    r
@@ -82,7 +82,7 @@ import numpy as np
 
 SCHEMA = 1
 NAME = 'tx40'
-SOURCE_SHA256 = 'fb8651f3f1d05f4c7a2e02bfc0e7108b55005147e5eea394276297efb5c70103'
+SOURCE_SHA256 = '1cd8e9c50efa64c554e6ed77dea2e1f3bcc45524b4cdbaefc04edf6b4989e0bf'
 JOINTS = (1, 2, 3, 4, 5, 6)
 CONSTANTS = {'D3': 0.225, 'RL4': 0.225, 'g': 9.81}
 BASE_PARAMETERS = (

@@ -26,7 +26,7 @@ Bounds = tuple[Real | None, Real | None]
 LEAST = 1e-6  # smallest eigenvalue, SI, that standard parameters keep where there is room
 FLAT = 1e-3  # of the second moments of a link: less than that is a point, a line or a plane
 ROUNDING = 1e-9  # t* above -ROUNDING is zero to the accuracy of the solver
-WATER = 1000.0  # kg/m^3; arms have a fifth of it in the cube of their reach
+DENSITY = 200.0  # kg/m^3, of a robot in the cube of its size: a fifth of water; arms have 20 to 100
 POSES = 200  # random, in which the size of a robot is looked for
 TYPICAL = {"X": 0.1, "Y": 0.1, "Z": 0.1, "MX": 0.3, "MY": 0.3, "MZ": 0.3, "M": 3.0}  # kg m^2, kg m, kg; scales of the unknowns only
 
@@ -187,7 +187,7 @@ def reach_of(model: GeneratedModel) -> float:
 def plausible(physical: PhysicalModel, limits: RobotLimits, reach: float) -> RobotLimits:
     """The limits with those that the size of a robot, m, sets where nothing is said about its masses.
 
-    No centre of mass lies further from the origin of its frame, along any axis, and all links together weigh less than water in a cube of that side.
+    No centre of mass lies further from the origin of its frame, along any axis, and all links together weigh less than a fifth of the water in a cube of that side.
     """
     if not np.isfinite(reach):
         return limits
@@ -196,7 +196,7 @@ def plausible(physical: PhysicalModel, limits: RobotLimits, reach: float) -> Rob
     own = {str(j): box for j in physical.links if str(j) not in limits.ellipsoid}
     return RobotLimits(
         bounds=limits.bounds,
-        total_mass=limits.total_mass if said else (0.0, WATER * reach**3),
+        total_mass=limits.total_mass if said else (0.0, DENSITY * reach**3),
         centre={**own, **limits.centre},
         ellipsoid=limits.ellipsoid,
     )

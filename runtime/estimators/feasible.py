@@ -86,7 +86,7 @@ class FeasibleOptions(RobotLimits):
         Weight of D; held-out: that by which four fifths of the record in time predict the fifth that is left out best; auto: the largest, to half
         a decade, that raises the residual norm by at most 1 %.
     reach : float, str or None, m
-        Size of the robot: no centre of mass lies further from the origin of its frame, and all links together weigh less than water in a cube of that
+        Size of the robot: no centre of mass lies further from the origin of its frame, and all links together weigh less than a fifth of the water in a cube of that
         side, where `total_mass` and `bounds` say nothing. auto: from its frames; null: no such bounds.
     bootstrap : int
         Resampled records (blocks of time) behind `sigma_corrected`; 0: none.
