@@ -296,6 +296,7 @@ class Recognition:
                 if entries is None:
                     self.reasons[name] = "a coefficient is not rational in what may vary"
                     return None
+                self.reasons[name] = "a denominator vanishes at the fixed angles"  # unless it does not
                 return _fraction(entries, P, Q)
         self.reasons[name] = f"no fraction of degree up to {DEGREES[-1]} in {_texts((*matters, *depends.powers)) or 'rational numbers'}"
         return None

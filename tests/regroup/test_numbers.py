@@ -232,7 +232,7 @@ def test_many_random_robots_with_numbers(start: int) -> None:
     print(f"seeds {start}: {exact} of {len(results)} exact, slowest {max(t for _, t, _ in results):.1f} s")
 
 
-@pytest.mark.parametrize("seed", [1257, 2035, 1554, 2099])
+@pytest.mark.parametrize("seed", [1257, 2035, 1554, 2099, 2374])
 def test_coefficients_of_many_numbers_and_angles_are_recognised(seed: int) -> None:
     """Gears as factors; angles whose cosines are polynomials of each other."""
     assert regrouping(numeric_robot(seed)).method == EXACT
