@@ -37,7 +37,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.errors import InputError
+from runtime.errors import InputError, SettingsError
 from runtime.estimators import wls
 from runtime.estimators.block_covariance import drawn_again, gram_root
 from runtime.estimators.estimate import Estimate
@@ -201,7 +201,12 @@ def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> 
         return at(options.weight), options.weight
     allowed = INCREASE * residual_norm(rows, K @ at(0.0))
     for weight in WEIGHTS:
-        chi = at(float(weight))
+        try:
+            chi = at(float(weight))
+        except SettingsError:
+            raise
+        except InputError:  # as in `held_out_weight`
+            continue
         if residual_norm(rows, K @ chi) <= allowed:
             return chi, float(weight)
     return at(0.0), 0.0
@@ -222,7 +227,12 @@ def held_out_weight(observation: Observation, system: System, physical: Physical
     def error(weight: float) -> float:
         at(f"feasible, held-out error with the prior weighed by {weight:g}")
         fixed = replace(options, weight=weight)
-        return float(np.linalg.norm([residual_norm(left, K @ weighed(kept, physical, fixed)[0]) for kept, left in parts]))
+        try:
+            return float(np.linalg.norm([residual_norm(left, K @ weighed(kept, physical, fixed)[0]) for kept, left in parts]))
+        except SettingsError:
+            raise
+        except InputError:  # a weight by which the program is too badly scaled for the solver
+            return float("inf")
 
     return min(map(float, (*DECADES, 0.0)), key=error)
 

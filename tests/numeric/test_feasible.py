@@ -388,3 +388,47 @@ def test_standard_parameters_where_a_friction_is_zero(tx40) -> None:
     np.testing.assert_allclose(physical.K @ found, X, atol=1e-9)
     assert np.linalg.norm((found - values) / scale) <= np.linalg.norm((chi - values) / scale) + 1e-6
     assert min(c.smallest(found) for c in physical.conditions) > -1e-9
+
+
+@pytest.mark.parametrize("weight", ["held-out", "auto"])
+def test_a_weight_that_the_solver_cannot_do_is_passed_over(arm, monkeypatch, weight: str) -> None:
+    """The search goes on with the others; where none can be solved, the error is that of the solver."""
+    import runtime.estimators.feasible as method
+
+    seen, solid, whole = simulated(arm, arm.base_parameters(arm.VALUES), 0.5, N=60), replace_values(arm), method.fitted
+    settings = EstimateSettings("feasible", options={**PLAIN, "prior": "entropic", "weight": weight, "explain": False})
+
+    def failing(R, z, physical, options, weight=0.0):
+        if weight > 1e-3:
+            raise InputError("the semidefinite program was not solved (Clarabel: InsufficientProgress)")
+        return whole(R, z, physical, options, weight)
+
+    monkeypatch.setattr(method, "fitted", failing)
+    found = estimate_of(seen, settings, model=solid)
+    assert found.status == "ok" and found.details["weight"] <= 1e-3 and found.details["masses"] == {}
+
+
+def test_values_given_in_part_pull_what_they_name(arm) -> None:
+    """Ten of twenty values: they count, the others stay free, and the message says how many."""
+    seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.5, N=60)
+    partial = replace_values(arm)
+    partial.VALUES = {name: x for name, x in partial.VALUES.items() if name.endswith("2")}
+    found = estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0}), model=partial)
+    assert found.status == "ok" and "(10 parameters of links have no value and stay free)" in found.message
+    with pytest.raises(SettingsError, match="needs all values of every link; the robot file has none of XX1"):
+        estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": "entropic"}), model=partial)
+
+
+def test_masses_have_the_range_of_all_physical_robots(arm) -> None:
+    """Bounds of the same program: a mass in its range explains the record, beyond it none does; one that is given is determined."""
+    seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.3, N=60)
+    wide = estimate_of(seen, FEASIBLE, model=arm)
+    mass = wide.details["masses"]["M2"]
+    assert mass["lowest"] <= mass["value"] <= mass["highest"] and not wide.details["masses"]["M1"]["determined"]
+    inside, outside = (
+        estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, "bounds": {"M2": bound}}), model=arm)
+        for bound in ([1.05 * mass["lowest"], 1.1 * mass["lowest"]], [0, 0.8 * mass["lowest"]])
+    )
+    assert inside.residual_norm <= 1.0101 * wide.residual_norm < outside.residual_norm
+    given = estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, "bounds": {"M1": [4, 4.2]}}), model=arm)
+    assert given.details["masses"]["M1"]["determined"] and "M1" not in given.message
