@@ -33,7 +33,7 @@ PASSES, FIRST = 12, 30
 """Most passes over the sites, and over the changes alone ahead of them."""
 SETTLED = 0.1
 """Relative change of the jerk density at which the passes over the changes end."""
-DAMPING = 0.5
+DAMPING = 0.7
 CHANGE = 0.02
 """Relative change of the precisions at which passes end."""
 LINES = 0.01
@@ -167,8 +167,8 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _first_density(y: Array) -> Array:
-    """A density above any that the record asks for, shape (n, 1): the range of the motion passed in a hundredth of a second."""
-    return np.asarray((np.ptp(y, axis=1, keepdims=True) + 1) ** 2 * 1e10)
+    """A density above any that the record asks for, from which MacKay's rule takes few passes, shape (n, 1): root 1e4 s^(-5/2) times the range."""
+    return np.asarray((np.ptp(y, axis=1, keepdims=True) + 1) ** 2 * 1e8)
 
 
 def _from_changes(y: Array, known: Array, errors: Sequence[LineErrors]) -> tuple[Array, Array]:

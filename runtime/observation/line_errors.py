@@ -31,7 +31,7 @@ COMPARED, CLEAR = (0.1, 0.03, 0.01), 0.03
 """Deviations whose evidence is compared first, and the difference by change that tells."""
 WEAK = 0.06
 """Precision of every count taken as a position, where no count changes: a hundredth of an interval's, since neighbours say the same."""
-PASSES = 3
+PASSES = 2
 FEWEST = 50
 """Changes below which lines count as even."""
 CROSSINGS, ENOUGH = 5, 20
