@@ -207,7 +207,7 @@ def certify_formulas(regrouping: Regrouping, *, seed: int = 101, sampler: Sample
             "which no record can tell; round the numbers that are meant round, angles and axes first"
         )
     sizes = sorted(x for f in robot.frames for e in (f.b, f.d, f.r0) if (x := abs(e.value(robot.constants))))
-    if rank > exact_rank == len(regrouping) and sizes[-1] > FAR_APART * sizes[0]:
+    if sizes and rank > exact_rank == len(regrouping) and sizes[-1] > FAR_APART * sizes[0]:
         special.append(
             f"lengths between {sizes[0]:.3g} and {sizes[-1]:.3g} m lie too far apart for checks in double precision; give them in one order of size"
         )
