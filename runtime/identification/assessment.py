@@ -53,8 +53,8 @@ def assess(
     )
     if not result.determined:
         reason = "friction, physical consistency, encoder resolution: the record does not determine the parameters"
-        return replace(result, missing=(reason,))
-    missing: list[str] = []
+        return replace(result, missing=(*result.missing, reason))
+    missing = list(result.missing)
 
     def attempt(part: str, compute: Callable[[], T]) -> T | None:
         progress(part)
