@@ -49,7 +49,13 @@ def assess(
     """
     progress("identification")
     result = identify(
-        model, records, study, simulator=simulator, variants=variants, plausible=True, provenance=provenance, progress=progress
+        model,
+        records,
+        study,
+        simulator=simulator,
+        variants=variants,
+        plausible=True,
+        provenance=provenance,
     )
     if not result.determined:
         reason = "friction, physical consistency, encoder resolution: the record does not determine the parameters"

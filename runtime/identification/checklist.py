@@ -150,6 +150,7 @@ def checklist_of(
     advice: Advice | None = None,
     plausible: Sequence[Check] = (),
     homogeneity: Homogeneity | None = None,
+    halves: bool = False,
 ) -> Checklist:
     """The checklist of an identification; rank alone where the record does not determine the parameters.
 
@@ -171,6 +172,8 @@ def checklist_of(
         Whether a physical robot can have the parameters.
     advice : Advice, optional
         The coarsest encoders, and the step in use.
+    halves : bool
+        Whether `prediction_error` is that of a part of the record from another one, not of a validation record.
     plausible : sequence of Check
         Whether record, study and robot file suit each other: what is wrong there is the cause of what follows.
     homogeneity : Homogeneity, optional
@@ -179,7 +182,7 @@ def checklist_of(
     checks = [determined(estimate, fit), *plausible]
     if estimate.status != "rank-deficient":
         differ = homogeneity is not None and homogeneity.largest > RELEVANT
-        checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error, differ=differ)]
+        checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error, halves, differ=differ)]
         checks += [] if homogeneity is None else [agreeing(homogeneity)]
         checks += [signs(negative), certain(fit, bootstrap), separate(fit)]
         checks += [physical(fit if "standard" in fit.details else estimate, feasibility), resolved(advice)]
@@ -246,17 +249,22 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
     )
 
 
-def predicted(fit: Estimate, error: float, *, differ: bool = False) -> Check:
-    """Largest relative error, %, on data that did not give the parameters; open where it is nan. differ : records disagree by more than RELEVANT."""
+def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool = False) -> Check:
+    """Largest relative error, %, on data that did not give the parameters; open where it is nan.
+
+    halves : it is that of a half of the record, fitted from the other half. Half a record may lack what the whole one shows: never a "no".
+    differ : records disagree by more than RELEVANT.
+    """
     limits = [min(max(times * fit.relative_error, least), most) for (times, least), most in zip(PREDICTION, UNSEEN, strict=True)]
     return Check(
         "Does it predict data it has not seen?",
-        _state(error, *limits) if np.isfinite(error) else "open",
+        "open" if not np.isfinite(error) else "doubtful" if halves and error > limits[0] else _state(error, *limits),
         f"{error:.1f} % stay unexplained there, {fit.relative_error:.1f} % where it was fitted",
         f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
         "see in which parameters the records differ: another robot, load or wiring, or a motion that one of them does not excite"
         if differ
-        else "fewer parameters (a larger essential.threshold), a longer or richer record",
+        else ("name a record that it has to predict (validate.record); " if halves else "")
+        + "fewer parameters (a larger essential.threshold), a longer or richer record",
     )
 
 

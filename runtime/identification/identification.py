@@ -7,7 +7,7 @@ model, records, study -> Y = W X + rho -> all parameters, eqs. (7)-(11), and the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -57,7 +57,6 @@ def identify(
     variants: GeneratedModel | None = None,
     plausible: bool | None = None,
     provenance: Mapping[str, Any] | None = None,
-    progress: Callable[[str], None] = lambda part: None,
 ) -> Identification:
     """Parameters of a robot from its records, and how far to trust them.
 
@@ -83,8 +82,6 @@ def identify(
         Whether record, study and robot file suit each other (`runtime.plausibility`); default: where `variants` is given.
     provenance : mapping, optional
         What else reproduces the result; names of the records, hashes and versions are added.
-    progress : function of str
-        Called with the name of each part that takes its time.
 
     Returns
     -------
@@ -156,7 +153,7 @@ def identify(
         payload=None if study.payload is None else payload_study(model, whole, study, provenance=origin(records)),
         feasibility=feasibility_of(result) if physical and not result.feasible else None,
         friction=friction_curves(model, whole, study, fit) if friction else (),
-        plausibility=plausibility(model, records, study, variants=variants, progress=progress)
+        plausibility=plausibility(model, records, study, variants=variants)
         if (variants is not None if plausible is None else plausible)
         else None,
     )

@@ -207,6 +207,7 @@ class Identification:
             self.verdict,
             bootstrap=dict(zip(drawn.names, drawn.drawn, strict=True)) if self.model_columns == "essential" else {},
             prediction_error=self.prediction_error,
+            halves=self.unseen.startswith("a part"),
             negative=self.negative if self.determined else (),
             feasibility=self.feasibility,
             homogeneity=self.homogeneity,

@@ -11,6 +11,7 @@ from runtime.reporting import figures as plots
 from runtime.reporting.correlations import correlation_section
 from runtime.reporting.page import Image, Section
 from runtime.reporting.parameters import parameter_section
+from runtime.reporting.plausibility import plausibility_section
 from runtime.reporting.residuals import residual_section
 from runtime.reporting.series import series
 from runtime.reporting.uncertainty import uncertainty_section
@@ -29,6 +30,7 @@ def identification_sections(result: Identification) -> list[Section]:
     unit = result.torque_unit
     return [
         parameter_section(result),
+        *([] if result.plausibility is None else [plausibility_section(result.plausibility)]),
         torque_section(result),
         joint_section(result),
         *([record_section(result)] if result.record_errors or result.time_stamps or result.homogeneity else []),

@@ -16,7 +16,6 @@ from symgen.cli.session import (
     model_of,
     progress_lines,
     reported_errors,
-    say,
     show,
     simulator_of,
     single_thread,
@@ -72,7 +71,6 @@ def identify(
             variants=variants_of(robot) if plausible else None,
             plausible=plausible,
             provenance=computed,
-            progress=say,
         )
         if results is not None:
             runtime.report(result, results)

@@ -8,7 +8,7 @@ The alternatives (`runtime.identification.plausibility.alternatives`) are tried 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,6 +26,7 @@ from runtime.identification.plausibility.trials import DECISIVE, Problem, Trial,
 from runtime.model.generated import GeneratedModel, joint_units
 from runtime.model.inertia import physical_model
 from runtime.observation.observation import observe
+from runtime.progress import at
 from runtime.records.record import Record
 from runtime.records.stream import Stream
 from runtime.settings.study import EstimateSettings, Study
@@ -117,7 +118,6 @@ def plausibility(
     study: Study | None = None,
     *,
     variants: GeneratedModel | None = None,
-    progress: Callable[[str], None] = lambda part: None,
 ) -> Plausibility:
     """Whether record, study and robot file suit each other, and what explains the record better where they do not.
 
@@ -130,8 +130,6 @@ def plausibility(
         Default: Study().
     variants : GeneratedModel, optional
         The module of `symgen.variants`: alternatives are then tried in any case, those of the table of frames too.
-    progress : function of str
-        Called with the name of each part before it is computed.
     """
     study = study or Study()
     several = list(records) if isinstance(records, Sequence) else [records]
@@ -140,7 +138,7 @@ def plausibility(
         return Plausibility(
             (Check("Do record and robot file suit each other?", "open", "Not asked: the record is read by blocks", "", "set stream: off"),)
         )
-    progress("plausibility of the record")
+    at("plausibility of the record")
     checks = [times(whole)]
     try:
         samples = samples_of(whole, study)
@@ -165,7 +163,7 @@ def plausibility(
     checks += [check for check in asked if check is not None]
     trials: list[Trial] = []
     if variants is not None or any(check.state in WORST[:2] for check in checks):
-        progress("what would explain the record better")
+        at("what would explain the record better")
         sides = study.record[0].sides if study.record else ("joint", "joint")
         trials = _ranked([*tried(problem, sides), *searched(problem)])
     named = decisive(trials, problem.given)
@@ -211,7 +209,8 @@ def rest(model: GeneratedModel, records: Sequence[Record], study: Study, samples
         except InputError:
             return Check(question, "doubtful", text, limit, remedy)
     text += f"; without these rows the fit leaves {errors[1]:.1f} % in place of {errors[0]:.1f} %"
-    return Check(question, "doubtful" if errors[1] < 0.8 * errors[0] else "good", text, limit, remedy)
+    state: State = "no" if errors[1] < 0.5 * errors[0] else "doubtful" if errors[1] < 0.8 * errors[0] else "good"
+    return Check(question, state, text, limit, remedy)
 
 
 def _error(model: GeneratedModel, records: Sequence[Record], study: Study) -> float:
