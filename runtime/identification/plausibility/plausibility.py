@@ -38,6 +38,8 @@ GAP = 1.0
 """Score of the best physical robot less that of free parameters, nats a row that counts, from which physics objects."""
 DENSITY = (0.3, 2e4)
 """Mass of a robot over the cube of its reach, kg/m^3: outside, the torques have another unit or side."""
+ROWS = 5
+"""Rows for one parameter, below which nothing is judged but the record itself."""
 FEWEST = 20
 """Rows of a joint that moves, below which nothing is judged but the record itself."""
 RATE = 20.0
@@ -150,7 +152,7 @@ def plausibility(
         physical = None
     checks += [*before_checks(model, samples, physical), rest(model, whole, study, samples)]
     rows = samples.moving().sum(axis=0)
-    enough = int(rows.sum()) > 2 * len(model.BASE_PARAMETERS) and int(rows.min()) > FEWEST
+    enough = int(rows.sum()) > ROWS * len(model.BASE_PARAMETERS) and int(rows.min()) > FEWEST
     if physical is None or not enough:
         reason = "too few samples at which every joint moves" if not enough else "the model has no standard parameters"
         return Plausibility((*checks, Check("Does physics agree?", "open", f"Not asked: {reason}")))
@@ -162,13 +164,23 @@ def plausibility(
     asked = (physics(model, alone), size(model, alone), None if late is None else delayed(late), None if known is None else values(known))
     checks += [check for check in asked if check is not None]
     trials: list[Trial] = []
-    if variants is not None or any(check.state in WORST[:2] for check in checks):
+    told_apart = problem.N * samples.n > 2 * len(model.BASE_PARAMETERS)  # rows that count
+    if told_apart and (variants is not None or any(check.state in WORST[:2] for check in checks)):
         at("what would explain the record better")
         sides = study.record[0].sides if study.record else ("joint", "joint")
         trials = _ranked([*tried(problem, sides), *searched(problem)])
     named = decisive(trials, problem.given)
     checks += [] if gravity is None else [direction(gravity, named)]
-    checks += [better(problem, named, tried=bool(trials))] if trials else []
+    if trials:
+        checks.append(better(problem, named))
+    elif not told_apart:
+        checks.append(
+            Check(
+                "Is the study the best explanation of the record?",
+                "open",
+                f"Not asked: {problem.N * samples.n:.0f} rows count, too few for {len(model.BASE_PARAMETERS)} parameters",
+            )
+        )
     return Plausibility(
         tuple(checks), tuple(t for t in trials if t.fit is not None)[:10], tuple(named), _equivalent(problem), late, gravity, known
     )
@@ -305,7 +317,7 @@ def direction(gravity: Gravity, named: Sequence[Trial]) -> Check:
     return Check(question, state, f"Fitted freely it is {gravity.text}", limit, remedy)
 
 
-def better(problem: Problem, named: Sequence[Trial], *, tried: bool) -> Check:
+def better(problem: Problem, named: Sequence[Trial]) -> Check:
     """The alternatives that explain the record decisively better."""
     question, limit = "Is the study the best explanation of the record?", f"no single change gains {DECISIVE:g} nats"
     if not named:
