@@ -8,6 +8,7 @@ from symgen.derive.elements import element_column
 from symgen.derive.newton_euler import Motion
 from symgen.derive.regressor import Axes
 from symgen.derive.scalar import Scalar
+from symgen.derive.time_limit import require_time
 from symgen.description.robot import INERTIAL, Element, Robot, parameter
 
 
@@ -29,6 +30,7 @@ def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]
     algebra.section("Contributions that several joints share")
     result: dict[str, dict[int, Scalar]] = {}
     for name in names:
+        require_time()
         tree = axes.column(*inertial[name]) if name in inertial else element_column(motion, *elements[name])
         result[name] = closure.project(algebra, tree)
     return result

@@ -20,6 +20,7 @@ from types import ModuleType
 import numpy as np
 
 from symgen.derive.exact import Array
+from symgen.derive.time_limit import limited
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.emit.generate import generate_files
@@ -50,7 +51,8 @@ def certify(regrouping: Regrouping, text: str | None = None) -> Certificate:
     DescriptionError
         The loops close in too few random states.
     """
-    certificate = certify_formulas(regrouping)
+    with limited(f"the certificate of {regrouping.robot.name}"):
+        certificate = certify_formulas(regrouping)
     file = f"{regrouping.robot.name}.py"
     if text is None:
         text = generate_files(regrouping.robot, regrouping=regrouping)[file]

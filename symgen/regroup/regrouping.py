@@ -14,6 +14,7 @@ from functools import lru_cache
 from symgen.derive.columns import element_names, inertial_names
 from symgen.derive.exact import Draw, Fp
 from symgen.derive.loops import close
+from symgen.derive.time_limit import limited
 from symgen.description.expression import ONE, ZERO, Call, Expression, with_known_cosines
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.regroup.finite_field import rref
@@ -118,9 +119,10 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     DescriptionError
         The loops cannot close.
     SymgenError
-        A general loop closes in too few states near its start.
+        A general loop closes in too few states near its start; the derivation takes more processor time than its limit.
     """
-    return _regrouped(robot, seed)
+    with limited(f"the regrouping of {robot.name}"):
+        return _regrouped(robot, seed)
 
 
 @lru_cache(maxsize=16)

@@ -29,6 +29,7 @@ from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion
+from symgen.derive.time_limit import require_time
 from symgen.description.expression import Call, Expression, Number
 from symgen.description.robot import Robot
 from symgen.regroup.finite_field import rref, small_rational, solve_each
@@ -277,6 +278,7 @@ class Recognition:
         matters = depends.free
         above, below = (tuple(_atom(v) for v, n in depends.powers.items() for _ in range(sign * n)) for sign in (1, -1))
         for (numerator, denominator), angles in product(DEGREES, self._choices(matters)):
+            require_time()
             if comb(len(matters) - sum(isinstance(v, tuple) for v in matters) + len(angles) + numerator, numerator) > MAX_UNKNOWNS:
                 continue  # more products without a sine than may be looked for
             P = [(*m, *above) for m in self._monomials(matters, angles, numerator)]
