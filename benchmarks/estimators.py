@@ -306,7 +306,8 @@ joint 2 and ZZ3R keep more (last columns). Likely because a loop that answers en
 sign(qd) of such a motion, filtered, is in W. WLS and TLS do not help on the TX40: both suppose errors that are independent of the torque, and inside
 the loop the torque answers them. Output error in position is the first to break (EMPS, coarsest step). Stated sigma is above the scatter where the
 encoder is coarse: its residuals repeat from record to record. The figure below is one of `symgen cestac` with `place: loop`, the phase of the encoders
-random from run to run (`python benchmarks/cestac_estimators.py`). Dashed: recorded positions alone rounded, `place: record`. DIDIM does not see them
+random from run to run, five records a step (`python benchmarks/cestac_estimators.py`); on the TX40 it agrees with the table, on the EMPS a random phase
+adds scatter at the coarsest step. Dashed: recorded positions alone rounded, `place: record`. DIDIM does not see them
 at all, which says nothing about an encoder in the loop.
 
 ![bias and scatter](estimators.png)
