@@ -34,6 +34,8 @@ PASSES, FIRST = 12, 30
 SETTLED = 0.1
 """Relative change of the jerk density at which the passes over the changes end."""
 DAMPING = 0.7
+FAR = 6.0
+"""Deviations from both of its bounds at which a sample says nothing."""
 CHANGE = 0.02
 """Relative change of the precisions at which passes end."""
 LINES = 0.01
@@ -114,7 +116,9 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
         cavity = 1 / np.maximum(1 / v - t, 0.02 / v)
         m = cavity * (x / v - u)
         s = np.sqrt(cavity + e2)
-        g, H = box_moments((low - m) / s, (high - m) / s)
+        near = np.flatnonzero(np.minimum(m - low, high - m) < FAR * s)
+        g, H = np.zeros((2, len(s)))
+        g[near], H[near] = box_moments((low - m)[near] / s[near], (high - m)[near] / s[near])
         g, H = g / s, H / s**2
         left = 1 - cavity * H
         t_new, u_new = H / left, (g + H * m) / left
