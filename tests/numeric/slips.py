@@ -211,7 +211,7 @@ KR300 = (
     Slip(
         12,
         "rate 1000 for 250",
-        r"sampling rate is 1/4",
+        r"sampling rate is 1/",
         lambda c: replace(
             c,
             rate=4.0,
@@ -371,7 +371,7 @@ SIMULATED = (
     Slip(7, "gravity along y", r"gravity (has|points)|it is \(.*-1.00\)", lambda c: c.text("[0, 0, -g]", "[0, -g, 0]")),
     Slip(8, "alpha of frame 2 with the wrong sign", r"alpha of frame 2", lambda c: c.text("alpha: -pi/2", "alpha: pi/2")),
     Slip(9, "coupling of joints 2 and 3 forgotten", r"coupling of joints 2 and 3", _coupled),
-    Slip(12, "rate 2000 for 500", r"sampling rate is 1/4", lambda c: replace(c, rate=4.0)),
+    Slip(12, "rate 2000 for 500", r"sampling rate is 1/", lambda c: replace(c, rate=4.0)),
     Slip(13, "motor torques taken for joint torques", r"gear|torque_side", lambda c: replace(c, torque_side="joint")),
     Slip(
         15,

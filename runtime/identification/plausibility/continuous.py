@@ -28,6 +28,8 @@ STEP = 1e-4
 """Finite difference, rad, m, or relative."""
 WORTH = 0.4
 """Gain of the first step over DECISIVE from which a number is searched."""
+SMALLEST = {"factor": 0.15, "length": 0.15, "zero": 0.17, "angle": 0.17}
+"""What is told of a number, relative or rad: less is within what robots and records are."""
 SEARCHED = 4
 """Numbers searched at most."""
 
@@ -214,7 +216,10 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
     width = 0.5 * abs(best)
     bounds = max(best - width, -quantity.span), min(best + width, quantity.span)
     minimize_scalar(score, bounds=bounds, method="bounded", options={"maxiter": 7})
-    alternative = quantity.change(min(scores, key=lambda xi: scores[xi]))
+    xi = min(scores, key=lambda xi: scores[xi])
+    if abs(xi) < SMALLEST[quantity.kind]:
+        return None
+    alternative = quantity.change(xi)
     grams = problem.grams(alternative)
     if grams is None:
         return None

@@ -37,8 +37,10 @@ MU = (3.0, 0.3, 0.03)
 """Weights of the barrier, one after the other; the last is that of the result, nats."""
 TOLERANCE = 0.4
 """Relative deviation of a link from its value in the robot file that is one standard deviation."""
-EXTENT = 2.0
+EXTENT = 5.0
 """Largest root mean square distance of the mass of a link from the origin of its frame, lengths of `Barrier`."""
+WIDE = 1.0
+"""... and not less than this, m: bodies reach beyond the frames of a small robot."""
 HEAVY = 0.3
 """Price of mass, nats for one mass of `Barrier`: what the samples leave open stays light."""
 ROUND = 0.5
@@ -164,7 +166,7 @@ class Barrier:
         for row, c in zip(signed, scalars, strict=True):
             row[list(c.numbers)] = 1.0
         inside = np.zeros((len(links), self.p))
-        extent = (EXTENT * length) ** 2
+        extent = max(EXTENT * length, WIDE) ** 2
         for row, numbers in zip(inside, self.place, strict=True):
             row[numbers] = [-0.5, 0, 0, -0.5, 0, -0.5, 0, 0, 0, extent]
         self.rows = np.vstack([signed, inside])

@@ -36,7 +36,9 @@ Array = np.ndarray
 
 GAP = 1.0
 """Score of the best physical robot less that of free parameters, nats a row that counts, from which physics objects."""
-DENSITY = (0.3, 2e4)
+WORSE = 2.5
+"""... and its error of a joint above that of free parameters, %."""
+DENSITY = (0.15, 1e5)
 """Mass of a robot over the cube of its reach, kg/m^3: outside, the torques have another unit or side."""
 ROWS = 5
 """Rows for one parameter, below which nothing is judged but the record itself."""
@@ -237,13 +239,14 @@ def physics(model: GeneratedModel, problem: Problem) -> Check:
     free, given = problem.free, problem.given
     gap = (given.score - given.penalty - free.score) / problem.N
     ratio = given.errors / np.maximum(free.errors, 0.3)
-    j = int(np.argmax(ratio))
+    j = int(np.argmax(given.errors - free.errors))
     text = (
         f"A physical robot leaves {given.errors[j]:.1f} % of the torque of joint {model.JOINTS[j]}, free parameters {free.errors[j]:.1f} %"
     )
     limit = "about the same error"
     remedy = "a sign, an axis, a length or the order of the columns is wrong: look at the alternatives below"
-    return Check("Can a physical robot explain the record?", "good" if gap < GAP else "doubtful", text, limit, remedy)
+    worse = gap > GAP and ratio[j] > 1.5 and given.errors[j] - free.errors[j] > WORSE
+    return Check("Can a physical robot explain the record?", "doubtful" if worse else "good", text, limit, remedy)
 
 
 def size(model: GeneratedModel, problem: Problem) -> Check | None:
@@ -254,7 +257,7 @@ def size(model: GeneratedModel, problem: Problem) -> Check | None:
     length = reach(model, problem.samples.q)
     physical = problem.physical
     masses = sum(problem.given.X[physical.link(j)[-1]] for j in physical.links)
-    if not physical.links or length > FARTHEST or length <= 0.1:
+    if not physical.links or length > FARTHEST or length <= 0.1 or "m" in joint_units(model):
         return None
     density = masses / length**3
     text = f"They ask for a robot of about {masses:.2g} kg with a reach of {length:.2g} m"
