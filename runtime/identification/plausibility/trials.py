@@ -192,4 +192,4 @@ def decisive(trials: Sequence[Trial], given: Fit) -> list[Trial]:
 
 def _visible(fit: Fit, given: Fit) -> bool:
     ratio = given.errors / np.maximum(fit.errors, 0.1)
-    return bool(((ratio > VISIBLE) & (given.errors - fit.errors > 0.5)).any()) or given.penalty - fit.penalty > DECISIVE
+    return bool(((ratio > VISIBLE) & (given.errors - fit.errors > 0.2)).any()) or given.penalty - fit.penalty > DECISIVE
