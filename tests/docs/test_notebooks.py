@@ -45,7 +45,6 @@ def test_teaching_notebook_is_stored_without_results() -> None:
 @campaign
 def test_two_link_arm_proves_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every check of the teaching notebook is True, its rank is 6, its formulas are typeset; the page of the site is made from the same cells."""
-    nbclient = pytest.importorskip("nbclient")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
     notebook = nbformat.read(TEACHING, as_version=4)
     nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}).execute()
