@@ -39,6 +39,8 @@ def torques_agree(robot: Robot, module: ModuleType) -> None:
     size = max(abs(e.value(robot.constants)) for f in robot.frames for e in (f.b, f.d, f.r0))
     reach = [0.1 * size if robot.frame(j).sigma else 0.3 for j in joints]
     q = np.array([start[j] for j in joints]) + np.array(reach) * rng.uniform(-1, 1, (20, len(joints)))
+    q = q[[closes(module, one) for one in q]]
+    assert len(q) >= 4
     at, zero = whole(robot, q, module.passive_joints(q)), np.zeros((1, len(joints)))
     keep = np.argsort(Multipliers(robot, at[:1], zero, zero).regularity(at))[-4:]
     qd, qdd = rng.standard_normal((2, 4, len(joints)))
@@ -46,6 +48,15 @@ def torques_agree(robot: Robot, module: ModuleType) -> None:
     X, tau = module.base_parameters(chi), oracle.torque(chi)
     for found in (module.inverse_dynamics(q[keep], qd, qdd, X), module.regressor(q[keep], qd, qdd) @ X):
         assert np.abs(found - tau).max() < 1e-10 * np.abs(tau).max()
+
+
+def closes(module: ModuleType, q: np.ndarray) -> bool:
+    """Whether the mechanism reaches q, shape (n,)."""
+    try:
+        module.passive_joints(q)
+    except ValueError:
+        return False
+    return True
 
 
 def check(kind: str, seed: int, folder: Path) -> None:
