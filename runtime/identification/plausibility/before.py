@@ -61,7 +61,7 @@ def _limits(model: GeneratedModel, key: str) -> Array | None:
 
 
 def _per_joint(names: Sequence[int], values: Array, unit: Sequence[str], chosen: Array) -> str:
-    return ", ".join(f"joint {names[j]} {values[j]:.3g} {unit[j]}" for j in np.flatnonzero(chosen)[:4])
+    return ", ".join(f"{values[j]:.3g} {unit[j]} (joint {names[j]})" for j in np.flatnonzero(chosen)[:4])
 
 
 def times(records: Sequence[Record]) -> Check:
