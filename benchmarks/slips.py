@@ -11,9 +11,9 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "numeric")]
 
-from tests.numeric import slips  # noqa: E402
+import slips  # noqa: E402
 
 
 def main(which: list[str]) -> None:

@@ -92,6 +92,7 @@ def test_advice_judges_the_steps_asked_for(emps_data):
     assert refused.exit_code == 2
 
 
+@campaign
 def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(emps_data, tmp_path, monkeypatch):
     arguments = ["emps", "emps", "--delta", "1e-6", "--runs", 12, "-o", tmp_path]
     taken = []

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime.result_files import write_all
@@ -31,6 +32,7 @@ def test_nothing_else_is_checked_in():
     assert {p.stem for p in GENERATED.glob("*.py")} == {*packaged_robots(), "tx40_casadi", "emps_casadi", "tx40_xp"}
 
 
+@campaign
 def test_same_bytes_whatever_the_hash_seed():
     code = "import hashlib, sys\nfrom symgen.cli.generate import emitted\n"
     code += "for name, text in emitted(['haptic', 'two_branch'], ('numpy', 'casadi', 'c', 'xp')).items():\n"

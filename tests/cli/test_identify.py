@@ -179,6 +179,7 @@ def whole(tx40_data):
     return run("tx40", "tx40", "--json").stdout
 
 
+@campaign
 @pytest.mark.parametrize("held", [pytest.param(100e6, marks=campaign), 0], ids=["rows held", "rows reduced"])
 def test_blocks_give_the_same_result(whole, monkeypatch, held):
     """Every figure of estimate.json but the settings, to 1e-9 of the largest of its kind."""

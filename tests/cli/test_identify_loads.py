@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime.model.generated import load_model
@@ -45,6 +46,7 @@ def run(folder, text: str, *options: str):
     return CliRunner().invoke(app, ["identify", "planar_2r", str(folder / "study.yaml"), *options])
 
 
+@campaign
 def test_load_and_torque_constants(folder, tmp_path) -> None:
     result = run(folder, LOAD, "-o", str(tmp_path / "out"))
     assert result.exit_code == 0, result.output
@@ -83,6 +85,7 @@ def test_bad_input_is_one_line_and_exit_code_2(folder, text: str, said: str) -> 
     assert result.exit_code == 2 and said in result.output and "Traceback" not in result.output
 
 
+@campaign
 def test_friction_and_physical_options(folder, tmp_path) -> None:
     result = run(folder, "", "-o", str(tmp_path / "out"), "--friction", "--physical")
     assert result.exit_code == 0, result.output
@@ -95,6 +98,7 @@ def test_friction_and_physical_options(folder, tmp_path) -> None:
     assert "Friction curves" in report and "Physical consistency" in report
 
 
+@campaign
 def test_infeasible_least_squares_is_told(tx40_data) -> None:
     result = CliRunner().invoke(app, ["identify", "tx40", "tx40", "--physical", "--json"])
     assert result.exit_code == 0

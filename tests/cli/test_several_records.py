@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime import load_model
@@ -49,6 +50,7 @@ def identified(*arguments):
     return json.loads(result.stdout)
 
 
+@campaign
 def test_every_way_gives_the_same_numbers(folder):
     by_line = identified(folder / "one.yaml", folder / "b.csv", folder / "c.csv")
     for study in ("also", "list"):

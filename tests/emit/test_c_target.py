@@ -171,6 +171,7 @@ int main(void)
 """
 
 
+@campaign
 @needs_compiler
 @pytest.mark.parametrize("path", [[], pytest.param(["-DPORTABLE"], marks=campaign)], ids=["wide", "portable"])
 def test_sanitizers(path: list[str], tmp_path: Path) -> None:

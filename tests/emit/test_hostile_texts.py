@@ -240,6 +240,7 @@ def test_any_text(text):
     assert "??/" not in files["arm.c"]
 
 
+@campaign
 @pytest.mark.parametrize("every", [8, pytest.param(1, marks=campaign)])
 @pytest.mark.parametrize("field", ["constant", "family", "name"])
 def test_names_are_identifiers_that_hide_nothing(field, every, expected, tmp_path):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from campaign import sampled
+from campaign import campaign, sampled
 
 from symgen.cli.generate import emitted
 from symgen.description import load_robot, packaged_robots
@@ -91,6 +91,7 @@ def test_agrees_under_numpy_and_under_the_strict_standard(name):
     agree(name, package("array_api_strict"))
 
 
+@campaign
 @pytest.mark.parametrize("name", sampled(["tx40", "haptic", "sr400", "emps_asymmetric"], 0, always=("emps_asymmetric",)))
 def test_agrees_under_jax(name):
     agree(name, package("jax"))

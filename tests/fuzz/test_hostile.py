@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import campaign
 
 from fuzz.archives import npy_header, plain_npy
 from fuzz.seeds import csv_file, model_files, npz_members, robot_file, urdf_files
@@ -129,6 +130,7 @@ def archive(members, method=zipfile.ZIP_DEFLATED):
     return bytearray(stream.getvalue())
 
 
+@campaign
 def test_zip_bombs(reader):
     zeros = npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (7500000,)}\n") + bytes(60_000_000)
     bomb = archive(dict.fromkeys(npz_members(), zeros))
@@ -151,12 +153,14 @@ def test_members_that_overlap_and_names_that_climb(reader, tmp_path):
     refused(reader, "npz", bytes(data), "case.npz")
 
 
+@campaign
 def test_gzip_bombs(reader):
     refused(reader, "csv.gz", gzip.compress(b"1," * 150_000_000, 1), "unpacks to")
     for unit in (b"\n", b"1,", b"12\n", b"\x00"):
         refused(reader, "csv.gz", gzip.compress(unit * (30_000_000 // len(unit)), 1), "case.csv.gz")
 
 
+@campaign
 def test_lines_without_end(reader):
     refused(reader, "csv", b"1" * 20_000_000, "a line of more than")
     refused(reader, "csv", b"," * 10_000_000, "a line of more than")
@@ -165,6 +169,7 @@ def test_lines_without_end(reader):
     refused(reader, "csv", b"\n" * 8_000_000, "lines are empty or comments")
 
 
+@campaign
 def test_parquet_bombs(reader, tmp_path):
     """A constant column of any length takes no space."""
     import polars
@@ -175,6 +180,7 @@ def test_parquet_bombs(reader, tmp_path):
     refused(reader, "parquet", stream.getvalue(), "unpacks to")
 
 
+@campaign
 def test_matlab_declares_more_than_it_holds(reader):
     def element(kind, data, length=None):
         return struct.pack("<II", kind, len(data) if length is None else length) + data

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from bag_files import KINDS, joint_states, write_bag
+from campaign import campaign
 
 from runtime import read_record
 from runtime.errors import InputError
@@ -45,6 +46,7 @@ def test_every_storage_gives_the_same_bits(tmp_path, kind):
         assert dict(record.files) == {"run": hashlib.sha256(line.encode()).hexdigest()}
 
 
+@campaign
 def test_columns(tmp_path):
     path = bag(tmp_path)
     np.testing.assert_array_equal(read_record(settings(path, columns={"q": ["elbow", "shoulder"]})).tau, TAU[:, ::-1])

@@ -7,6 +7,7 @@ from hashlib import sha256
 import numpy as np
 import planar_2r_model as planar
 import pytest
+from campaign import campaign
 from planar_data import TRUE, motion, record
 from scipy.stats import t
 
@@ -71,6 +72,7 @@ def test_statistics_are_equations_18_to_22(small):
     assert np.allclose(result.half_width, 4.302652729911275 * sigma / np.sqrt(3))  # Student, 2 degrees of freedom, 97.5 %
 
 
+@campaign
 def test_processes_give_the_same_bits(small):
     """Of this one, too: BLAS has one thread in all of them (conftest.py)."""
     calls = []

@@ -59,6 +59,7 @@ def test_robust_least_squares_on_rounded_positions(arm, study, record):  # noqa:
     assert found.reference.method == "irls" and found.notes == ()
 
 
+@campaign
 def test_instruments_on_rounded_positions(arm, study, record, simulator):  # noqa: F811
     model, *_, truth, _ = arm
     start = away(truth, model.BASE_PARAMETERS)
@@ -74,6 +75,7 @@ def test_instruments_on_rounded_positions(arm, study, record, simulator):  # noq
     assert "place: loop" in found.notes[0]
 
 
+@campaign
 def test_didim_does_not_see_recorded_positions_and_says_so(arm, study, record, simulator):  # noqa: F811
     model, *_, truth, _ = arm
     found = cestac(model, record, method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one"), simulator=simulator)
@@ -83,6 +85,7 @@ def test_didim_does_not_see_recorded_positions_and_says_so(arm, study, record, s
     assert found.estimator == "DIDIM" and "DIDIM" in found.mean_table().to_text()
 
 
+@campaign
 def test_the_encoder_in_the_loop_has_a_random_phase(arm, study, simulator):  # noqa: F811
     """Positions of a run lie on phi + k Delta; the arm answers them; the run is least squares of that record."""
     model, *_ = arm

@@ -263,6 +263,7 @@ def test_parameters_without_inertia_are_refused_on_the_way(arm, clean):
         iteration.initial(clean[1].closed_loop.loop, clean[1], {"M9": 1.0})
 
 
+@campaign
 def test_identify_by_instruments(emps_data, tmp_path):
     """The command line: figures, trail and Hausman test in estimate.json."""
     from typer.testing import CliRunner

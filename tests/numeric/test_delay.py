@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaign import FULL, campaign
 
 import runtime
 import symgen
 from runtime.errors import InputError
 from runtime.settings.study import study_from_mapping
-from tests.campaign import FULL, campaign
 
 STUDY = study_from_mapping({"signals": {"median": 1, "lowpass": {"cutoff": 30}}})
 

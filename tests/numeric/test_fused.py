@@ -238,6 +238,7 @@ def test_no_warnings(compiler, variant, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@campaign
 @pytest.mark.parametrize("variant", ["-DPORTABLE", *(pytest.param(flag, marks=campaign) for flag in ("-DSCALAR", "-O1"))])
 def test_clean_under_sanitizers_and_the_same_numbers(variant, tmp_path):
     """A driver with arrays of exact size, which prints a checksum of every result; the plain loops give the same to rounding."""

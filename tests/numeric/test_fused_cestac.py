@@ -84,6 +84,7 @@ def test_one_run_on_the_tx40_record_is_the_plain_pipeline(tx40_data, tmp_path):
     assert found.settings["target"] == "c" and found.provenance["processor"]
 
 
+@campaign
 @pytest.mark.parametrize(
     ("seed", "changed"),
     [

@@ -190,6 +190,7 @@ def test_a_definition_of_its_own_is_refused(tmp_path):
     refused(lambda: open_table(path), "defined otherwise")
 
 
+@campaign
 @pytest.mark.parametrize("qos", ["[" * 3000, "- a\n" * 100_000])
 def test_quality_of_service_that_takes_long_to_read(tmp_path, qos):
     path = write_bag("bare db3", tmp_path / "run", MESSAGES)
@@ -294,6 +295,7 @@ def whole(tmp_path_factory):
     return [(path.suffix, path.read_bytes()) for path in paths]
 
 
+@campaign
 def test_truncated_bags(tmp_path, whole):
     for k, (suffix, data) in enumerate(whole):
         path = tmp_path / f"a{suffix}"

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from campaign import campaign
 
 import runtime
 from runtime import InputError
@@ -73,6 +74,7 @@ def test_records_of_one_name_stay_apart(model):
     assert origin(stamped)["time"] == {"run": "uniform", "run (2)": "a gap"}
 
 
+@campaign
 def test_report_writes_what_the_verbs_write(model, tmp_path):
     result = assess(model, measured(model, 5), STUDY, encoder=(1e-4,))
     assert result.missing == () and result.feasibility is not None and len(result.friction) == 2

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import campaign
 from planar_data import OLS, TRUE, observation
 from scipy.optimize import least_squares
 
@@ -71,6 +72,7 @@ def test_outliers_count_less_and_are_told(settings):
     assert Estimate.from_json(found.to_json()).details["down_weighted"] == found.details["down_weighted"]
 
 
+@campaign
 @pytest.mark.parametrize("settings", [HUBER, pytest.param(TUKEY, marks=pytest.mark.campaign)])
 def test_normal_noise_costs_five_per_cent_and_sigma_matches_the_scatter(settings):
     runs = [estimate_of(observation(N=400, rate=40.0, noise=(0.3, 0.2), seed=k), settings) for k in range(150)]

@@ -53,6 +53,7 @@ def test_structures_of_the_file_and_the_source_agree(robot):
         assert 100 * np.linalg.norm(left) / np.linalg.norm(observation.Y) == pytest.approx(expected, abs=0.15)
 
 
+@campaign
 def test_errors_are_those_of_a_careful_identification(robot):
     """README of the record: OLS 3.22 and 21.4 %, feasible 3.36 and 10.8, with the counterbalance 2.30 and 7.4, all rows 12.3 and 25.1."""
     model, A, B = robot

@@ -159,6 +159,7 @@ def compressed(kind, content, zeros=0):
     return b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(data)) + data
 
 
+@campaign
 def test_bombs_are_refused(tmp_path):
     """Of more than the limit from a few kilobytes: an array that is declared and never stored, and a compressed one."""
     declared = file_73(lambda archive: archive.create_dataset("q", (10**12, 6), "f8", chunks=(1000, 6), compression="gzip"))

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import slips
+from campaign import campaign, sampled
 
 import runtime
 import symgen
+from oracles.random_robots import random_parameters, random_robot
 from runtime.estimators.semidefinite import LinearBounds, closest, everything
 from runtime.identification.plausibility.fits import Barrier, Grams, least_squares, physical_fit
 from runtime.identification.plausibility.samples import samples_of
 from runtime.model.inertia import physical_model
 from runtime.settings.study import Study
 from symgen.description.yaml import parse_robot
-from tests.campaign import campaign, sampled
-from tests.numeric import slips
-from tests.oracles.random_robots import random_parameters, random_robot
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+from campaign import campaign
 
 from runtime.errors import InputError
 from runtime.parallel import BLAS_THREADS, results
@@ -47,6 +48,7 @@ def test_processes_that_always_die():
         list(results(always_dying, None, range(2), 1))
 
 
+@campaign
 def test_processes_end_with_the_one_that_started_them(tmp_path):
     """Killed, it cannot tell them to."""
     code = "from runtime.parallel import results\nimport sys, time, test_processes\nif __name__ == '__main__':\n" \

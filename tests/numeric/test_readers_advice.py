@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign import campaign
 from test_cestac_counts import RECORD, SIGNALS, STEP, planar
 
 from runtime.reporting.resolution_advice import advice_section
@@ -38,6 +39,7 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
     assert np.all(np.abs(real.change(nodes, (1,)) - alone.change) < 3 * alone.half_width / 2 + 0.2 * np.abs(alone.change) + 0.3)
 
 
+@campaign
 def test_steps_by_both_readers(advice):
     positions, counts = advice.real
     assert (positions.reader, counts.reader) == ("lowpass", "counts") and advice.encoders is positions.encoders

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import campaign
 
 from runtime import load_model
 from runtime.motion.reference import Reference, reference_of
@@ -63,6 +64,7 @@ def test_an_axis_that_rests(tmp_path):
     assert (qd == 0).mean() > 0.2
 
 
+@campaign
 def test_six_joints_with_the_coupled_wrist():
     tx40 = load_model("tx40", folder=GENERATED)
     law = {

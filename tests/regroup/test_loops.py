@@ -249,6 +249,7 @@ loops:
 """
 
 
+@campaign
 def test_jack_that_fits_no_stroke_drawn_at_random() -> None:
     """A boom of 2 mm on a jack of 1 to 5 mm closes, and is the mechanism that it is in metres."""
     small, large = (find_relations(parse_robot(text, "jack.yaml")) for text in (JACK, JACK.replace(b"0.00", b"")))
@@ -285,6 +286,7 @@ def test_too_few_actuators() -> None:
         close(changed(load_robot("haptic"), 5, mu=0))
 
 
+@campaign
 def test_over_constrained_mechanism(few_starts: None) -> None:
     """A diagonal bar between arm 2 and crank 5 freezes the parallelogram: it turns as a whole, no more."""
     robot = load_robot("haptic")

@@ -7,12 +7,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from browser import FRAME, WEAK_CONTRAST
+from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime.model.generated import load_model
 from symgen.cli.main import app
 from symgen.description import load_robot
 from symgen.emit.generate import generate_module
+
+pytestmark = campaign
 
 DRAWN = "[...document.querySelectorAll('.plot .line')].map((n) => n.getAttribute('d')).join('|')"
 SPAN = "[...document.querySelectorAll('.plot')[0].querySelectorAll('text')].map((n) => n.textContent)"

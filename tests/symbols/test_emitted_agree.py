@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import importlib
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from campaign import campaign
 
+import runtime
 import symgen
 from oracles.exact_zero import valued
 from symgen.symbols.symbolic import symbolic
 
+GENERATED = Path(__file__).parents[2] / "generated"
 N = 20
 SMALL = ("planar_2r", "emps_asymmetric", "scara", "four_bar")
 LIMIT = 500  # terms of closed forms that are compared
@@ -25,7 +27,7 @@ MODELS = {"inertia_matrix": "q", "gravity": "q", "bias": "q qd", "inverse_dynami
 @cache
 def states(name: str):
     """(symbolic robot, emitted module, its arguments, values of the symbols): random states near those that close the loops."""
-    robot, module = symgen.load_robot(name), importlib.import_module(f"generated.{name}")
+    robot, module = symgen.load_robot(name), runtime.load_model(name, folder=GENERATED)
     rng, models = np.random.default_rng(7), symbolic(robot)
     relations = models.source.relations
     start = np.array([relations.start.get(j, 0.0) for j in robot.joints])
