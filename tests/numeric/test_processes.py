@@ -55,7 +55,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
            "    for pid in results(test_processes.waiting, None, [0.0, 60.0], 1):\n        print(pid, flush=True)\n"  # fmt: skip
     script = tmp_path / "script.py"
     script.write_text(code)
-    here = os.pathsep.join([str(Path(__file__).parent), str(Path(__file__).parents[2])])
+    here = os.pathsep.join(str(Path(__file__).parents[k]) for k in range(3))
     process = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": here})
     worker = int(process.stdout.readline())
     process.kill()
