@@ -25,6 +25,7 @@ from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.records.stream import RecordStream
 from runtime.settings.study import Lowpass, Rows, Signals, Study, study_from_mapping
+from symgen.demo.counts import MAIN
 
 RATE = 2000.0
 T = np.arange(8000) / RATE
@@ -272,27 +273,7 @@ def test_measured_record_at_a_coarse_step(tx40_data):
     model, study = load_model("tx40"), study_from_mapping(dataset_study("tx40"))
     full = read_records(study.record, model)[0]
     step = 2 * np.pi / 1000
-    main = [
-        "ZZ1R",
-        "FV1",
-        "FS1",
-        "XX2R",
-        "ZZ2R",
-        "MX2R",
-        "FV2",
-        "FS2",
-        "MY3R",
-        "Ia3",
-        "FV3",
-        "FS3",
-        "Ia4",
-        "FV4",
-        "FS4",
-        "Ia5",
-        "FV5",
-        "FS5",
-        "FV6",
-    ]
+    main = list(MAIN)
     q = counted(full.q, step)
     signals = replace(study.signals, reader="counts", step=step)
     read = observed_states(model, q, full.rate, signals)
