@@ -5,18 +5,23 @@ same rows: those of every candidate's filters and rows in turn, so that none win
 
     e_ck = 100 ||Y_k - W_k X_c|| / ||tau_k||         residual of candidate c on the validation records treated as by candidate k, of the measured torque
 
-known torques included in what is measured, so that those who know them have no advantage by the norm. Order: the geometric mean over k.
+known torques included in what is measured, so that those who know them have no advantage by the norm. Order: the geometric mean over k. A candidate whose
+estimator did not end well comes after all others. The winner of many candidates is chosen by the validation records, which are then no unseen data for it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from runtime.errors import InputError
 from runtime.identification.identification import identify
+from runtime.identification.parameter_sets import ORDER
+from runtime.identification.plausibility.plausibility import low_speed_of_rest, plausibility
+from runtime.identification.plausibility.samples import samples_of
 from runtime.identification.result import Identification
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import observe
@@ -29,6 +34,7 @@ from runtime.table import Table
 
 Candidate = Study | tuple[Study, Record | Sequence[Record], Record | Sequence[Record]]
 """A study that names its records and validation records, or a study, records and validation records."""
+STATED = "as stated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +47,13 @@ class Ranking:
         By name of the candidate, the best first.
     errors : mapping of str to mapping of str to float, %
         e_ck, by candidate, then by the treatment that it is judged in.
+    missing : tuple of str
+        Candidates that could not be identified, each with its reason.
     """
 
     results: Mapping[str, Identification]
     errors: Mapping[str, Mapping[str, float]]
+    missing: tuple[str, ...] = ()
 
     @property
     def best(self) -> Identification:
@@ -52,68 +61,119 @@ class Ranking:
         return next(iter(self.results.values()))
 
     @property
+    def mean_errors(self) -> dict[str, float]:
+        """Geometric mean of e_ck over k, %, by candidate."""
+        return {name: float(np.exp(np.mean(np.log(list(own.values()))))) for name, own in self.errors.items()}
+
+    @property
     def verdict(self) -> str:
         """The order, in one sentence."""
-        parts = [
-            f"{name} ({result.model_columns} parameters, {len(result.model_estimate.names)}) {mean_error(self.errors[name]):.1f} %"
-            for name, result in self.results.items()
-        ]
-        unseen = next(iter(self.results.values())).unseen
-        return f"Predicts {unseen} best: {parts[0]}; then {', '.join(parts[1:])} of the measured torques."
+        first, *others = [f"{name} ({columns_text(self.results[name])}) {error:.1f} %" for name, error in self.mean_errors.items()]
+        then = f"; then {', '.join(others)}" if others else ""
+        return f"Predicts {self.best.unseen} best: {first}{then} of the measured torques."
 
     def table(self) -> Table:
         """One line by candidate."""
-        header = ("treatment", "parameters", "fit %", "mean unseen %", *(f"rows of {name}, %" for name in self.results))
+        header = ("treatment", "parameters", "fit %", "unseen, rows of all treatments %", *(f"unseen, {name} %" for name in ORDER), "use")
         rows = [
             (
                 name,
-                f"{result.model_columns} ({len(result.model_estimate.names)})",
+                columns_text(result),
                 f"{result.model_estimate.relative_error:.2f}",
-                f"{mean_error(self.errors[name]):.2f}",
-                *(f"{self.errors[name][other]:.2f}" for other in self.results),
+                f"{self.mean_errors[name]:.2f}",
+                *(f"{result.set_errors[own]:.2f}" if own in result.set_errors else "-" for own in ORDER),
+                result.checklist.answer if result.usable else result.estimate.status,
             )
             for name, result in self.results.items()
         ]
-        return Table("Treatments of the records, the best first", header, rows)
+        return Table(
+            "Treatments of the records, the best first", header, rows, note="Unseen by set of parameters: on the treatment's own rows."
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        treatments = [
+            {
+                "name": name,
+                "status": result.estimate.status,
+                "columns": result.model_columns,
+                "count": len(result.model_estimate.names),
+                "fit": result.model_estimate.relative_error,
+                "unseen": self.mean_errors[name],
+                "unseen_by_rows": self.errors[name],
+                "unseen_by_set": result.set_errors,
+                "state": result.checklist.state,
+            }
+            for name, result in self.results.items()
+        ]
+        return {"schema": 1, "verdict": self.verdict, "treatments": treatments, "missing": self.missing}
 
     def __str__(self) -> str:
-        return f"{self.table().to_text()}\n\n{self.verdict}"
+        return "\n\n".join([self.table().to_text(), *self.missing, self.verdict])
 
 
 @single_threaded
-def compare(model: GeneratedModel, candidates: Mapping[str, Candidate]) -> Ranking:
+def compare(model: GeneratedModel, candidates: Candidate | Mapping[str, Candidate], *, variants: GeneratedModel | None = None) -> Ranking:
     """Identify with each of several treatments, and order them by what they predict.
 
     Parameters
     ----------
     model : GeneratedModel
         An emitted module.
-    candidates : mapping of str to Candidate
-        At least two, by name, each with validation records of the same instants.
+    candidates : mapping of str to Candidate, or Candidate
+        By name, each with validation records of the same instants. Of one alone the `treatments` are compared.
+    variants : GeneratedModel, optional
+        The module of `symgen.variants`: the plausibility of the best treatment is then judged.
 
     Raises
     ------
     InputError
-        One candidate alone, or one without validation records, or with others than the first.
+        A candidate without validation records, or with others than the first; none that can be identified.
     """
-    if len(candidates) < 2:
-        raise InputError(f"{len(candidates)} treatment; expected two or more to compare")
+    if not isinstance(candidates, Mapping):
+        candidates = treatments(model, candidates)
+    opened = {name: _opened(model, candidate) for name, candidate in candidates.items()}
+    for name, (_, _, further) in opened.items():
+        _require_alike(name, further, next(iter(opened.values()))[2])
     results: dict[str, Identification] = {}
-    unseen: dict[str, list[Record]] = {}
-    for name, candidate in candidates.items():
+    missing: list[str] = []
+    for name, (study, records, further) in opened.items():
         at(f"treatment {name}")
-        study, records, further = _opened(model, candidate)
-        unseen[name] = further
-        _require_alike(name, further, next(iter(unseen.values())))
-        results[name] = identify(model, records, study, further=further)
-    errors = {name: {other: _error(model, results[name], unseen[name], results[other].study) for other in results} for name in results}
-    order = sorted(results, key=lambda name: mean_error(errors[name]))
-    return Ranking({name: results[name] for name in order}, {name: errors[name] for name in order})
+        try:
+            results[name] = identify(model, records, study, further=further)
+        except InputError as e:
+            missing.append(f"{name}: {e}")
+    if not results:
+        raise InputError(f"no treatment can be identified; {missing[0]}" if missing else "no treatment; expected one or more to compare")
+    unseen = {name: opened[name][2] for name in results}
+    errors = {
+        name: {other: _error(model, result, unseen[name], results[other].study) for other in results} for name, result in results.items()
+    }
+    means = Ranking(results, errors).mean_errors
+    order = sorted(results, key=lambda name: (not results[name].usable, means[name]))
+    if variants is not None:
+        study, records, _ = opened[order[0]]
+        found = plausibility(model, records, study, variants=variants)
+        results[order[0]] = replace(results[order[0]], plausibility=found)
+    return Ranking({name: results[name] for name in order}, {name: errors[name] for name in order}, tuple(missing))
 
 
-def mean_error(errors: Mapping[str, float]) -> float:
-    """Geometric mean."""
-    return float(np.exp(np.mean(np.log(list(errors.values())))))
+def treatments(model: GeneratedModel, candidate: Candidate) -> dict[str, Candidate]:
+    """The candidate as stated, without the rows of joints that stand, and with its known torques left out, as far as these differ."""
+    study, records, further = _opened(model, candidate)
+    found: dict[str, Candidate] = {STATED: (study, records, further)}
+    low = low_speed_of_rest(samples_of(records, study), study)
+    if low is not None:
+        study = replace(study, rows=replace(study.rows, low_speed=low))
+        found["without rest"] = (study, records, further)
+    if any(record.tau_known is not None for record in (*records, *further)):
+        found["known torques left out"] = (study, [_measured(record) for record in records], [_measured(record) for record in further])
+    return found
+
+
+def columns_text(result: Identification) -> str:
+    """The set of parameters that stands for the robot, and their number."""
+    return f"{result.model_columns} parameters, {len(result.model_estimate.names)}"
 
 
 def _opened(model: GeneratedModel, candidate: Candidate) -> tuple[Study, list[Record], list[Record]]:
@@ -127,17 +187,25 @@ def _opened(model: GeneratedModel, candidate: Candidate) -> tuple[Study, list[Re
 def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]) -> None:
     if not further:
         raise InputError(f"{name} has no validation record, by which treatments are compared; set validate.record")
+    for record in further:
+        if not _measured(record).tau.any():
+            raise InputError(
+                "the torques are zero throughout; expected measured ones, which a validation record compares with", file=record.file
+            )
     if [len(record) for record in further] != [len(record) for record in first]:
         raise InputError(
             f"{name} is validated by {', '.join(r.file for r in further)}, the first by {', '.join(r.file for r in first)}; expected the same"
         )
 
 
+def _measured(record: Record) -> Record:
+    """The record with its known torques among the measured ones."""
+    return record if record.tau_known is None else replace(record, tau=record.tau + record.tau_known, known="")
+
+
 def _error(model: GeneratedModel, result: Identification, unseen: Sequence[Record], study: Study) -> float:
     """Residual of a result on validation records treated as by `study`, % of the measured torque."""
     fit = result.model_estimate
-    own = observe(model, unseen, study)
-    residual, _ = own.norms(fit.names, fit.X)
-    measured = [x if x.tau_known is None else replace(x, tau=x.tau + x.tau_known) for x in unseen]
-    _, total = observe(model, measured, study).norms((), np.zeros(0))
+    residual, _ = observe(model, unseen, study).norms(fit.names, fit.X)
+    _, total = observe(model, [_measured(record) for record in unseen], study).norms((), np.zeros(0))
     return 100 * float(np.linalg.norm(residual) / np.linalg.norm(total))

@@ -161,7 +161,7 @@ def homogeneity(
         except InputError as e:
             untested.append(f"{record}, {e}")
             continue
-        if fit.status != "ok" or not np.isfinite(fit.sigma_corrected).all():
+        if fit.status != "ok" or not np.isfinite(fit.sigma_corrected).all() or not fit.sigma.all():
             lost = ", ".join(name for group in fit.groups for name in group)
             untested.append(f"{record}, which alone does not determine {lost or 'the parameters and their deviations'}")
             continue

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from runtime.excitation.search import Excitation
+from runtime.identification.compare import Ranking
 from runtime.identification.fleet import Fleet
 from runtime.identification.result import Identification
 from runtime.json_documents import json_text
@@ -39,13 +40,16 @@ ONE_BLOCK = 40
 
 
 def report(
-    result: Identification | Cestac | Advice | Simulation | Excitation | Fleet, folder: str | Path | Results, *, study: Study | None = None
+    result: Identification | Ranking | Cestac | Advice | Simulation | Excitation | Fleet,
+    folder: str | Path | Results,
+    *,
+    study: Study | None = None,
 ) -> list[Path]:
     """Write the page and the files of a result into a folder: all of them, or none.
 
     Parameters
     ----------
-    result : Identification, Cestac, Advice, Simulation, Excitation or Fleet
+    result : Identification, Ranking, Cestac, Advice, Simulation, Excitation or Fleet
     folder : str, Path or Results
         Made where it is missing; or one that this process keeps for itself (`runtime.result_files.reserved`).
     study : Study, optional
@@ -70,7 +74,7 @@ def report(
 def files_of(result: object, folder: Path, study: Study) -> Files:
     """Contents of `folder` by file name; TypeError for a result without files."""
     raise TypeError(
-        f"{type(result).__name__} is no result that is written; expected an Identification, Cestac, Advice, Simulation, Excitation or Fleet"
+        f"{type(result).__name__} is no result that is written; expected an Identification, Ranking, Cestac, Advice, Simulation, Excitation or Fleet"
     )
 
 
@@ -107,6 +111,13 @@ def identification_files(
 @files_of.register
 def _(result: Identification, folder: Path, study: Study) -> Files:
     return identification_files(result, folder)
+
+
+@files_of.register
+def _(result: Ranking, folder: Path, study: Study) -> Files:
+    """The comparison, and the files of the best identification."""
+    section = Section("Treatments compared", (result.verdict, *result.missing), tables=(result.table(),))
+    return {"comparison.json": json_text(result.summary()), **identification_files(result.best, folder, sections=(section,))}
 
 
 @files_of.register

@@ -17,6 +17,7 @@ VERBS = {
     "check": "Verify the certificate of a robot's base parameters.",
     "identify": "Estimate the base parameters from a measured record.",
     "cestac": "Judge whether the encoder resolves enough for an identification.",
+    "compare": "Find which treatment of the records predicts best.",
     "report": "Everything one record says about a robot, judged, on one page.",
     "fleet": "Identify many robots from their records, with one table.",
     "excite": "Search a motion that excites the parameters within the limits.",

@@ -194,19 +194,14 @@ def rest(model: GeneratedModel, records: Sequence[Record], study: Study, samples
     """Share of the instants at which a joint stands, and what leaving them out changes."""
     question = "Do the joints move while they are used?"
     limit = f"standing at most {100 * REST:g} % of the rows that are used"
-    low = np.broadcast_to(np.asarray(study.rows.low_speed, dtype=float), (samples.n,))
-    speed = np.abs(samples.qd)
-    used = speed >= low
-    standing = used & (speed <= samples.standing())
-    share = standing.sum(axis=0) / np.maximum(used.sum(axis=0), 1)
+    share = standing_share(samples, study)
     worst = int(np.argmax(share))
     text = f"Joint {model.JOINTS[worst]} stands in {100 * share[worst]:.0f} % of its rows"
-    if share[worst] <= REST:
+    proposed = low_speed_of_rest(samples, study)
+    if proposed is None:
         return Check(question, "good", text, limit)
-    units = joint_units(model)
-    wanted = tuple(float(f"{max(v, x):.1g}") for v, x in zip(samples.standing(), low, strict=True))
-    proposed: float | tuple[float, ...] = max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
-    remedy = f"set rows.low_speed: {list(proposed) if isinstance(proposed, tuple) else proposed} ({units[worst]}/s), or cut the record (rows.window)"
+    stated = list(proposed) if isinstance(proposed, tuple) else proposed
+    remedy = f"set rows.low_speed: {stated} ({joint_units(model)[worst]}/s), or cut the record (rows.window)"
     errors = []
     for rows in (study.rows, replace(study.rows, low_speed=proposed)):
         try:
@@ -216,6 +211,23 @@ def rest(model: GeneratedModel, records: Sequence[Record], study: Study, samples
     text += f"; without these rows the fit leaves {errors[1]:.1f} % in place of {errors[0]:.1f} %"
     state: State = "no" if errors[1] < 0.5 * errors[0] else "doubtful" if errors[1] < 0.8 * errors[0] else "good"
     return Check(question, state, text, limit, remedy)
+
+
+def standing_share(samples: Samples, study: Study) -> Array:
+    """Share of the rows of each joint at which it stands, shape (n,)."""
+    speed = np.abs(samples.qd)
+    used = speed >= np.asarray(study.rows.low_speed, dtype=float)
+    standing = used & (speed <= samples.standing())
+    return np.asarray(standing.sum(axis=0) / np.maximum(used.sum(axis=0), 1))
+
+
+def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
+    """rows.low_speed that leaves out the rows of joints that stand, rad/s or m/s; None where at most REST of them stand."""
+    if standing_share(samples, study).max() <= REST:
+        return None
+    low = np.broadcast_to(np.asarray(study.rows.low_speed, dtype=float), (samples.n,))
+    wanted = tuple(float(f"{max(v, x):.1g}") for v, x in zip(samples.standing(), low, strict=True))
+    return max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
 
 
 def _error(model: GeneratedModel, records: Sequence[Record], study: Study) -> float:
