@@ -166,7 +166,7 @@ def feasible(
             estimate.message,
             difference_text(system, unconstrained.text, active, estimate, without),
             prior_text(physical, options, weight),
-            masses_text(masses),
+            masses_text(masses, options),
         )
         if part
     )
@@ -213,7 +213,7 @@ def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> 
 
 
 def held_out_weight(observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions) -> float:
-    """The weight of D by which the halves of the record predict each other best."""
+    """The weight of D by which four fifths of the record predict the fifth that is left out best."""
     if options.prior == "none":
         return 0.0
     t0, t1 = observation.span
@@ -224,8 +224,9 @@ def held_out_weight(observation: Observation, system: System, physical: Physical
     ]
     K = physical.rows(system.names)
 
+    at("feasible, the weight of the prior by held-out error")
+
     def error(weight: float) -> float:
-        at(f"feasible, held-out error with the prior weighed by {weight:g}")
         fixed = replace(options, weight=weight)
         try:
             return float(np.linalg.norm([residual_norm(left, K @ weighed(kept, physical, fixed)[0]) for kept, left in parts]))
@@ -273,10 +274,18 @@ def mass_ranges(rows: Factor, physical: PhysicalModel, options: FeasibleOptions,
     return ranges
 
 
-def masses_text(masses: Mapping[str, Mapping[str, float | bool]]) -> str:
-    """Which masses the record does not determine, in words."""
-    loose = [f"{name} ({own['lowest']:.3g} to {own['highest']:.3g} kg)" for name, own in masses.items() if not own["determined"]]
-    return f"Masses that this record does not determine, no values to use by themselves: {', '.join(loose)}." if loose else ""
+def masses_text(masses: Mapping[str, Mapping[str, float | bool]], options: FeasibleOptions) -> str:
+    """Which masses the record does not determine, and what would narrow them, in words."""
+    loose = [f"{name} ({own['lowest']:.2g} to {own['highest']:.3g} kg)" for name, own in masses.items() if not own["determined"]]
+    if not loose:
+        return ""
+    weighed = options.bounds or options.reach is None or not isinstance(options.total_mass, tuple) or options.total_mass[0] > 0
+    asked = (
+        ""
+        if weighed or options.prior != "none"
+        else " Give total_mass of the data sheet, or values in the robot file: they narrow these ranges."
+    )
+    return f"Masses that this record does not determine, no values to use by themselves: {', '.join(loose)}.{asked}"
 
 
 def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:

@@ -179,12 +179,14 @@ def checklist_of(
     homogeneity : Homogeneity, optional
         Whether several records agree.
     """
-    checks = [determined(estimate, fit), *plausible]
+    rank = determined(estimate, fit)
+    first, last = ([], [rank]) if rank.state == "doubtful" else ([rank], [])  # a bad condition is the least of several doubts
+    checks = [*first, *plausible]
     if estimate.status != "rank-deficient":
         differ = homogeneity is not None and homogeneity.largest > RELEVANT
         checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error, halves, differ=differ)]
         checks += [] if homogeneity is None else [agreeing(homogeneity)]
-        checks += [signs(negative), certain(fit, bootstrap), separate(fit)]
+        checks += [signs(negative), certain(fit, bootstrap), separate(fit), *last]
         checks += [physical(fit if "standard" in fit.details else estimate, feasibility), resolved(advice)]
     return Checklist(tuple(checks), use)
 
@@ -200,8 +202,11 @@ def determined(estimate: Estimate, fit: Estimate) -> Check:
     if failed is not None:
         return Check(question, "no", f"No: {failed.status}, {failed.message.rstrip('.')}", limit, "see the message of the estimator")
     cond = fit.cond_unit
-    text = f"rank {fit.rank} of {len(fit.names)}, condition number {cond:.3g} with unit columns"
-    return Check(question, "good" if cond <= COND else "doubtful", text, limit, "record a motion with a better condition (symgen excite)")
+    text = f"All {len(fit.names)}, condition number {rounded(cond)} with unit columns"
+    if cond <= COND:
+        return Check(question, "good", text, limit)
+    remedy = "record a motion that moves the joints in more combinations (symgen excite), or use fewer parameters (essential.threshold)"
+    return Check(question, "doubtful", f"{text}: some of their combinations it hardly does", limit, remedy)
 
 
 def explained(fit: Estimate) -> Check:
@@ -322,7 +327,13 @@ def physical(estimate: Estimate, feasibility: Feasibility | None) -> Check:
     question = "Can a physical robot have them?"
     limit = "every pseudo-inertia positive semidefinite, friction and motor inertia not negative"
     if "standard" in estimate.details:
-        return Check(question, "good", "Yes: they were fitted under these conditions", limit)
+        loose = [name for name, mass in estimate.details.get("masses", {}).items() if not mass["determined"]]
+        text = (
+            f"; the record does not determine the masses {', '.join(loose[:NAMED])}: none of them is a value to use by itself"
+            if loose
+            else ""
+        )
+        return Check(question, "good", f"Yes: they were fitted under these conditions{text}", limit)
     if feasibility is None:
         remedy = "symgen report, or symgen identify --physical"
         return Check(question, "open", "Not asked", limit, remedy)
@@ -351,6 +362,11 @@ def resolved(advice: Advice | None) -> Check:
     text += f"; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})"
     remedy = f"a finer encoder, or an estimator that simulates the closed loop (estimate.method: {', '.join(CLOSED_LOOP)})"
     return Check(question, _state(error, NEGLIGIBLE, BIASED), text, limit, remedy)
+
+
+def rounded(cond: float) -> str:
+    """A condition number, three digits, without a power of ten where it is short."""
+    return f"{float(f'{cond:.3g}'):.0f}" if 100 <= cond < 1e6 else f"{cond:.3g}"
 
 
 def _state(value: float, good: float, usable: float) -> State:

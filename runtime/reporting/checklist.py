@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from runtime.identification.checklist import Checklist
+from runtime.identification.checklist import Checklist, rounded
 from runtime.identification.result import Identification
 from runtime.reporting.page import Number, Section, state_mark
 from runtime.table import Table
@@ -34,6 +34,9 @@ def key_numbers(result: Identification) -> list[Number]:
         numbers.append(Number("worst joint", f"{worst.joint}: {worst.relative_error:.1f} %"))
     return [
         *numbers,
-        Number("rows of W, worth of independent ones", f"{fit.rows}, {sum(w.effective_rows for w in result.uncertainty.whiteness):.0f}"),
-        Number("condition number, unit columns", f"{fit.cond_unit:.3g}"),
+        Number(
+            "torque samples used, worth of independent ones",
+            f"{fit.rows}, {sum(w.effective_rows for w in result.uncertainty.whiteness):.0f}",
+        ),
+        Number("condition number, unit columns", rounded(fit.cond_unit)),
     ]

@@ -24,7 +24,7 @@ def assignment(text: str, option: str = "--constant") -> tuple[str, float]:
 
 
 def values_of_csv(content: bytes, file: str) -> dict[str, float]:
-    """Standard parameters by name from lines of name,value; a header name,value may stand first.
+    """Standard parameters by name from lines of name,value or name,value,note; a header with these names may stand first.
 
     Raises DescriptionError, with file and line, where a line is something else, or there is none.
     """
@@ -34,10 +34,10 @@ def values_of_csv(content: bytes, file: str) -> dict[str, float]:
     except (UnicodeDecodeError, csv.Error) as error:
         raise DescriptionError(f"{file}: {error}; expected lines of name,value") from error
     for line, row in enumerate(rows, start=1):
-        if row in ([], ["name", "value"]):
+        if row in ([], ["name", "value"], ["name", "value", "note"]):
             continue
         try:
-            name, value = row
+            name, value = row[:2] if len(row) == 3 else row
             values[name] = float(value)
         except ValueError as error:
             raise DescriptionError(f"{file}, line {line}: found {','.join(row)[:60]!r}; expected name,value") from error

@@ -134,7 +134,7 @@ def test_kept_frames_are_named(tmp_path):
 def test_values_of_an_estimate_go_into_the_urdf(tmp_path):
     file, csv = tmp_path / "arm.urdf", tmp_path / "standard_parameters.csv"
     file.write_text(ARM)
-    csv.write_text("name,value\nM2,1.25\nFS2,0.5\n")
+    csv.write_text("name,value,note\nM2,1.25,NOT determined: 1 to 9 kg\nFS2,0.5,\n")
     assert run("convert", file, tmp_path / "new.urdf", "--values", csv).exit_code == 0
     values = load_robot(tmp_path / "new.urdf").values
     assert values["M2"] == 1.25 and values["FS2"] == 0.5 and values["FV1"] == 0.3

@@ -26,6 +26,7 @@ from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.observation.observation import Observation
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
+from runtime.reporting.physical import standard_csv
 from runtime.settings.study import EstimateSettings, study_from_mapping
 from symgen.description import load_robot
 
@@ -430,5 +431,6 @@ def test_masses_have_the_range_of_all_physical_robots(arm) -> None:
         for bound in ([1.05 * mass["lowest"], 1.1 * mass["lowest"]], [0, 0.8 * mass["lowest"]])
     )
     assert inside.residual_norm <= 1.0101 * wide.residual_norm < outside.residual_norm
+    assert ",NOT determined: " in next(line for line in standard_csv(wide).splitlines() if line.startswith("M1,"))
     given = estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, "bounds": {"M1": [4, 4.2]}}), model=arm)
     assert given.details["masses"]["M1"]["determined"] and "M1" not in given.message
