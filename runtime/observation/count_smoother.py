@@ -22,7 +22,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.special import erfcx
 
 from runtime.observation.line_errors import LineErrors, line_errors
-from runtime.observation.spline_posterior import Basis, Factor
+from runtime.observation.spline_posterior import Basis, Factor, next_density
 
 Array = np.ndarray
 Lines = Literal["detected", "estimated"] | float
@@ -90,31 +90,33 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
     given = LINES if isinstance(lines, str) else lines
     errors = [LineErrors(given, 0, np.zeros(0), given)] * n
     tau, nu = _from_changes(y, known, errors)
-    density = np.full((n, basis.M), _first_density(y[:, :N]))
-    tau, nu, c, density = _passed(basis, tau, nu, density, np.zeros((n, basis.P)))
+    c, density = _passed(basis, tau, nu, _first_density(y[:, :N]))
     if isinstance(lines, str):
         errors, density = line_errors(basis, y, known, c, density, Ts, estimate=lines == "estimated")
         if any(each.deviation > LINES for each in errors):
             tau, nu = _from_changes(y, known, errors)
-            tau, nu, c, density = _passed(basis, tau, nu, density, c)
-    sites = _sites(y, known, density, Ts)
-    tau, nu = np.where(sites, tau, 0.0), np.where(sites, nu, 0.0)
-    of = np.nonzero(sites)[0]
-    low, high = y[sites] - 0.5, y[sites] + 0.5
+            c, density = _passed(basis, tau, nu, density.mean(axis=1))
+    sites = np.flatnonzero(_sites(y, known, density, Ts))
+    of, value = sites // basis.padded, y.ravel()[sites]
+    low, high = value - 0.5, value + 0.5
     for j, each in enumerate(errors):
         if len(each.shift):
-            number = np.round(y[j, sites[j]]).astype(int)
+            number = np.round(value[of == j]).astype(int)
             low[of == j] += each.of(number - 1)
             high[of == j] += each.of(number)
     e2 = np.array([each.left for each in errors])[of] ** 2
+    t, u = tau.ravel()[sites], nu.ravel()[sites]
+    tau, pull, x = np.zeros(y.shape), np.zeros(y.shape), basis.at_samples(c)
     for _ in range(PASSES):
+        tau.ravel()[sites], pull.ravel()[sites] = t, u - t * x.ravel()[sites]
         factor = Factor.of(basis.precision(tau, density))
-        c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), density, c))
+        c = c + factor.solve(basis.gradient(pull, density, c))
         Z = factor.inverse()
         density = _density(basis, c, Z, density)
-        x, v, t, u = basis.at_samples(c)[sites], basis.variances(Z)[sites], tau[sites], nu[sites]
+        x = basis.at_samples(c)
+        at, v = x.ravel()[sites], basis.variances(Z).ravel()[sites]
         cavity = 1 / np.maximum(1 / v - t, 0.02 / v)
-        m = cavity * (x / v - u)
+        m = cavity * (at / v - u)
         s = np.sqrt(cavity + e2)
         near = np.flatnonzero(np.minimum(m - low, high - m) < FAR * s)
         g, H = np.zeros((2, len(s)))
@@ -123,22 +125,27 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
         left = 1 - cavity * H
         t_new, u_new = H / left, (g + H * m) / left
         change = np.abs(t_new - t).sum() / t.sum()
-        tau[sites], nu[sites] = t + DAMPING * (t_new - t), u + DAMPING * (u_new - u)
+        t, u = t + DAMPING * (t_new - t), u + DAMPING * (u_new - u)
         if change < CHANGE:
             break
     return Smoothed(basis, c, Z, factor, density, origin, tuple(errors))
 
 
-def _passed(basis: Basis, tau: Array, nu: Array, density: Array, c: Array) -> tuple[Array, Array, Array, Array]:
-    """The spline through Gaussian sites, and the jerk density that goes with it, after at most FIRST passes."""
-    for number in range(FIRST):
-        for _ in range(2 if number == 0 else 1):
-            factor = Factor.of(basis.precision(tau, density))
-            c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), density, c))
-        before, density = density.mean(axis=1), _density(basis, c, factor.inverse(), density)
-        if number > 2 and (np.abs(density.mean(axis=1) / before - 1) < SETTLED).all():
+def _passed(basis: Basis, tau: Array, nu: Array, density: Array) -> tuple[Array, Array]:
+    """The spline through Gaussian sites, and the jerk density that goes with it, shape (n, M), after at most FIRST passes from `density`, (n,)."""
+    samples, unit = basis.of_samples(tau), basis.of_prior(np.ones((basis.n, basis.M)))
+    g = basis.gradient(nu, np.ones((basis.n, basis.M)), np.zeros((basis.n, basis.P)))
+    for _ in range(FIRST):
+        before, density = density, next_density(basis, samples, unit, g, density)
+        if (np.abs(density / before - 1) < SETTLED).all():
             break
-    return tau, nu, c, density
+    of_windows, c = np.repeat(density[:, None], basis.M, axis=1), np.zeros((basis.n, basis.P))
+    for _ in range(2):
+        factor = Factor.of(samples + basis.of_prior(of_windows))
+        for _ in range(2):
+            c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), of_windows, c))
+        of_windows = _density(basis, c, factor.inverse(), of_windows)
+    return c, of_windows
 
 
 def _sites(y: Array, known: Array, density: Array, Ts: float) -> Array:
@@ -153,8 +160,11 @@ def _sites(y: Array, known: Array, density: Array, Ts: float) -> Array:
         sites[j, at[[0, -1]]] = sites[j, at[change]] = sites[j, at[change + 1]] = True
         ends = np.concatenate([[0], np.repeat(change, 2) + np.tile([0, 1], len(change)), [len(at) - 1]]).reshape(-1, 2)
         spacing = SPACING * density[j].mean() ** -0.2 / Ts
-        for a, b in ends[ends[:, 1] - ends[:, 0] > spacing]:
-            sites[j, at[np.linspace(a, b, int((b - a) / spacing) + 1).astype(int)]] = True
+        a, length = ends[:, 0], ends[:, 1] - ends[:, 0]
+        parts = (length / spacing).astype(int)  # of every stretch without a change
+        which = np.repeat(np.arange(len(ends)), parts)
+        number = np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)
+        sites[j, at[(a[which] + number * (length / np.maximum(parts, 1))[which]).astype(int)]] = True
     return sites
 
 
@@ -171,8 +181,8 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _first_density(y: Array) -> Array:
-    """A density above any that the record asks for, from which MacKay's rule takes few passes, shape (n, 1): root 1e4 s^(-5/2) times the range."""
-    return np.asarray((np.ptp(y, axis=1, keepdims=True) + 1) ** 2 * 1e8)
+    """A density above any that the record asks for, from which MacKay's rule takes few passes, shape (n,): root 1e4 s^(-5/2) times the range."""
+    return np.asarray((np.ptp(y, axis=1) + 1) ** 2 * 1e8)
 
 
 def _from_changes(y: Array, known: Array, errors: Sequence[LineErrors]) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg.lapack import dpbtrs
 
-from runtime.observation.spline_posterior import Basis, Factor
+from runtime.observation.spline_posterior import Basis, Factor, next_density
 
 Array = np.ndarray
 
@@ -80,12 +80,12 @@ class LineErrors:
 
 
 def evidence(
-    basis: Basis, changes: Sequence[Changes], weak: tuple[Array, Array], speed: Array, density: Array, e: float, passes: int
+    basis: Basis, changes: Sequence[Changes], weak: tuple[Array, Array], speed: Array, r: Array, e: float, passes: int
 ) -> tuple[Array, Array]:
-    """Log evidence of the changes of every encoder with lines of deviation e, shape (n,), and the jerk density that goes with it, shape (n, M).
+    """Log evidence of the changes of every encoder with lines of deviation e, and the jerk density that goes with it, shape (n,) each.
 
     weak : precisions of single samples and these times the counts, shape (n, m M) each, which hold the spline where no count changes.
-    speed : steps a sample, shape (n, m M).   density : where the passes of MacKay's rule start; from above they are few.
+    speed : steps a sample, shape (n, m M).   r : density where the passes of MacKay's rule start; from above they are few.
     """
     tau, nu = weak[0].copy(), weak[1].copy()
     fixed = -0.5 * np.divide(nu**2, tau, out=np.zeros_like(nu), where=tau > 0).sum(axis=1)
@@ -94,16 +94,13 @@ def evidence(
         np.add.at(tau[j], each.before, w)
         np.add.at(nu[j], each.before, w * value)
         fixed[j] += 0.5 * np.log(w).sum() - 0.5 * (w * value**2).sum()
-    r, zero = density, np.zeros((basis.n, basis.P))
-    for number in range(passes + 1):
-        factor = Factor.of(basis.precision(tau, r))
-        g = basis.gradient(nu, r, zero)
-        c = factor.solve(g)
-        if number < passes:
-            squares, determined = basis.jerk(c) ** 2 * basis.h, 1 - basis.jerk_variances(factor.inverse()) * basis.h / r
-            r = np.broadcast_to(squares.mean(axis=1, keepdims=True) / np.maximum(determined.mean(axis=1, keepdims=True), 1e-9), r.shape)
-    halves = np.log(factor.L[0]).reshape(basis.n, -1).sum(axis=1) + 0.5 * np.log(r).sum(axis=1)
-    return fixed - halves + 0.5 * (g * c).sum(axis=1), r
+    samples, g = basis.of_samples(tau), basis.gradient(nu, np.ones((basis.n, basis.M)), np.zeros((basis.n, basis.P)))
+    unit = basis.of_prior(np.ones((basis.n, basis.M)))
+    for _ in range(passes):
+        r = next_density(basis, samples, unit, g, r)
+    factor = Factor.of(samples + unit / r[:, None])
+    fixed += 0.5 * basis.M * -np.log(r) + 0.5 * (g * factor.solve(g)).sum(axis=1)
+    return fixed - 0.5 * factor.log_determinants, r
 
 
 def _weights(changes: Changes, speed: Array, e: Array | float) -> tuple[Array, Array]:
@@ -125,7 +122,7 @@ def line_errors(
     speed = basis.at_samples(c, 1) * Ts
 
     def judged(sizes: Sequence[float]) -> dict[float, tuple[Array, Array]]:
-        found, r = {}, np.broadcast_to(density.mean(axis=1, keepdims=True), density.shape)
+        found, r = {}, density.mean(axis=1)
         for number, e in enumerate(sizes):
             found[e] = evidence(basis, changes, weak, speed, r, e, PASSES if number else 2 * PASSES)
             r = found[e][1]

@@ -23,6 +23,8 @@ Array = np.ndarray
 
 PAIRS = [(a, b) for a in range(4) for b in range(a, 4)]
 JERK = np.array([-1.0, 3.0, -3.0, 1.0])
+SLOPE = 1e-3
+"""Difference of log r by which log |A| is differentiated."""
 
 
 class Basis:
@@ -57,33 +59,52 @@ class Basis:
 
     def jerk(self, c: Array) -> Array:
         """Jerk of every interval, shape (n, M)."""
-        return np.asarray(np.diff(c, 3, axis=1)) / self.h**3
+        return third_differences(c) / self.h**3
 
     def jerk_variances(self, Z: Array) -> Array:
         """Its variances."""
-        return np.asarray(self._band(Z) @ np.array([(1 if i == j else 2) * JERK[i] * JERK[j] for i, j in PAIRS])) / self.h**6
+        total = np.zeros((self.n, self.M))
+        for i, j in PAIRS:
+            total += (1 if i == j else 2) * JERK[i] * JERK[j] * Z[j - i][:, i : i + self.M]
+        return np.asarray(total / self.h**6)
 
     def precision(self, tau: Array, density: Array) -> Array:
         """A by its diagonals, shape (4, n, P); tau, shape (n, m M), density r, shape (n, M)."""
-        samples = tau.reshape(self.n, self.M, self.m) @ self.products
+        return np.asarray(self.of_samples(tau) + self.of_prior(density))
+
+    def of_samples(self, tau: Array) -> Array:
+        """The share of A that sites of precision tau have, sum_k tau_k b_k b_k'."""
+        samples = (self.products.T @ tau.reshape(-1, self.m).T).reshape(len(PAIRS), self.n, self.M)
+        A = np.zeros((4, self.n, self.P))
+        for (i, j), of_pair in zip(PAIRS, samples, strict=True):
+            A[j - i][:, i : i + self.M] += of_pair
+        return A
+
+    def of_prior(self, density: Array) -> Array:
+        """The share of A that the prior has, sum_i (h/r_i) d_i d_i'."""
         prior = 1 / (self.h**5 * density)
         A = np.zeros((4, self.n, self.P))
-        for k, (i, j) in enumerate(PAIRS):
-            A[j - i][:, i : i + self.M] += samples[:, :, k] + JERK[i] * JERK[j] * prior
+        for i, j in PAIRS:
+            A[j - i][:, i : i + self.M] += JERK[i] * JERK[j] * prior
         return A
 
     def gradient(self, pull: Array, density: Array, c: Array) -> Array:
         """Slope of the log posterior at c, shape (n, P); pull = nu - tau x(c), shape (n, m M)."""
-        samples = pull.reshape(self.n, self.M, self.m) @ self.values[0]
-        prior = np.diff(c, 3, axis=1) / (self.h**5 * density)
+        samples = (self.values[0].T @ pull.reshape(-1, self.m).T).reshape(4, self.n, self.M)
+        prior = third_differences(c) / (self.h**5 * density)
         g = np.zeros((self.n, self.P))
         for i in range(4):
-            g[:, i : i + self.M] += samples[:, :, i] - JERK[i] * prior
+            g[:, i : i + self.M] += samples[i] - JERK[i] * prior
         return g
 
     def _band(self, Z: Array) -> Array:
         """Covariances of the pairs of coefficients of every interval, shape (n, M, 10)."""
         return np.stack([Z[j - i][:, i : i + self.M] for i, j in PAIRS], axis=-1)
+
+
+def third_differences(c: Array) -> Array:
+    """c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i of coefficients (n, P), shape (n, M)."""
+    return np.asarray(c[:, 3:] - c[:, :-3] + 3 * (c[:, 1:-2] - c[:, 2:-1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +125,11 @@ class Factor:
                 return cls(L, n)
         raise np.linalg.LinAlgError(f"the precision of coefficient {info} is not positive")
 
+    @property
+    def log_determinants(self) -> Array:
+        """log |A| of every channel, shape (n,)."""
+        return np.asarray(2 * np.log(self.L[0]).reshape(self.n, -1).sum(axis=1))
+
     def solve(self, g: Array) -> Array:
         """A^-1 g, shape (n, P)."""
         return np.asarray(dpbtrs(self.L, g.reshape(-1, 1), lower=1)[0].reshape(g.shape))
@@ -122,31 +148,45 @@ class Factor:
         l[:, :T], d[:T] = -self.L[1:] / self.L[0], 1 / self.L[0] ** 2
         l = np.ascontiguousarray(l.reshape(3, stretches, length).transpose(2, 0, 1))
         d = np.ascontiguousarray(d.reshape(stretches, length).T)
-        z, f = np.zeros((length + 3, 4, stretches)), np.zeros((length + 3, 3, stretches))
+        z, f = np.empty((length, 4, stretches)), np.zeros((length + 3, 3, stretches))
         f[[length, length + 1, length + 2], [0, 1, 2]] = 1
+        S, products = np.zeros((2, 3, 3, stretches)), np.empty((3, 3, stretches))  # S : covariances of c_(i+1), c_(i+2), c_(i+3)
+        now, after = S
         for i in range(length - 1, -1, -1):
-            (l1, l2, l3), z1, z2, z3, own = l[i], z[i + 1], z[i + 2], z[i + 3], z[i]
-            own[1] = l1 * z1[0] + l2 * z1[1] + l3 * z1[2]
-            own[2] = l1 * z1[1] + l2 * z2[0] + l3 * z2[1]
-            own[3] = l1 * z1[2] + l2 * z2[1] + l3 * z3[0]
-            own[0] = d[i] + l1 * own[1] + l2 * own[2] + l3 * own[3]
-            f[i] = l1 * f[i + 1] + l2 * f[i + 2] + l3 * f[i + 3]
-        ends = _joined(z, f)
+            each = l[i][:, None]
+            np.add.reduce(np.multiply(each, now, out=products), axis=0, out=z[i, 1:])
+            np.add(d[i], np.add.reduce(l[i] * z[i, 1:], axis=0), out=z[i, 0])
+            np.add.reduce(np.multiply(each, f[i + 1 : i + 4], out=products), axis=0, out=f[i])
+            after[1:, 1:], after[0], after[1:, 0] = now[:2, :2], z[i, :3], z[i, 1:3]
+            now, after = after, now
+        first = np.ascontiguousarray(now.transpose(2, 0, 1))
+        ends = _joined(first, np.ascontiguousarray(f[:3].transpose(2, 0, 1)))
         weighted = np.einsum("abw,ibw->iaw", ends, f)
-        Z = [z[:length, lag] + np.einsum("iaw,iaw->iw", f[:length], weighted[lag : lag + length]) for lag in range(4)]
-        return np.stack([x.T.reshape(-1)[:T] for x in Z]).reshape(4, self.n, -1)
+        Z = np.empty((4, stretches, length))
+        for lag in range(4):
+            Z[lag] = (z[:, lag] + np.einsum("iaw,iaw->iw", f[:length], weighted[lag : lag + length])).T
+        return Z.reshape(4, -1)[:, :T].reshape(4, self.n, -1)
 
 
-def _joined(z: Array, f: Array) -> Array:
-    """Covariance of the three coefficients behind every stretch, shape (3, 3, stretches)."""
-    stretches = z.shape[2]
-    first = np.empty((stretches, 3, 3))
-    for a in range(3):
-        for b in range(a, 3):
-            first[:, a, b] = first[:, b, a] = z[a, b - a]
-    through = np.ascontiguousarray(f[:3].transpose(2, 0, 1))
-    ends, S = np.empty((stretches, 3, 3)), np.zeros((3, 3))
-    for w in range(stretches - 1, -1, -1):
+def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: Array) -> Array:
+    """MacKay's rule for one density r of the jerk by channel, shape (n,): squares of the jerk over the number of jerks that sites determine.
+
+    samples, unit : shares of A that sites have, and the prior of density one.   g : slope at c = 0.   The number is M less the trace of
+    A^-1 unit/r, which is the slope of log |A| by log 1/r: two factors and no inverse.
+    """
+    factor, beside = (Factor.of(samples + unit / x[:, None]) for x in (r, r * np.exp(SLOPE)))
+    determined = basis.M - (factor.log_determinants - beside.log_determinants) / SLOPE
+    squares = (basis.jerk(factor.solve(g)) ** 2).sum(axis=1) * basis.h
+    return np.asarray(squares / np.maximum(determined, 1e-9 * basis.M))
+
+
+def _joined(first: Array, through: Array) -> Array:
+    """Covariance of the three coefficients behind every stretch, shape (3, 3, stretches).
+
+    first : that of the first three of a stretch given those behind it.   through : how these depend on those; shape (stretches, 3, 3) each.
+    """
+    ends, S = np.empty_like(first), np.zeros((3, 3))
+    for w in range(len(first) - 1, -1, -1):
         ends[w] = S
         S = first[w] + through[w] @ S @ through[w].T
     return np.ascontiguousarray(ends.transpose(1, 2, 0))
