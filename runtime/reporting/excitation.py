@@ -8,8 +8,8 @@ import matplotlib as mpl
 import numpy as np
 
 from runtime.model.generated import joint_labels
-from runtime.reporting.figures import STYLE, panels_figure, shared_legend
-from runtime.reporting.page import Image, Page, Section
+from runtime.reporting.figures import STYLE, drawn, panels_figure, shared_legend
+from runtime.reporting.page import Page, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,18 +42,18 @@ def motion_figure(excitation: Excitation) -> Figure:
             ax.set_title(title, fontsize=9)
             ax.set_xlim(t[0], t[-1])
         axes[-1].set_xlabel("time, s")
-        shared_legend(figure, axes[0], min(6, len(excitation.model.JOINTS)), size=8)
+        shared_legend(figure, axes[:1], min(6, len(excitation.model.JOINTS)), size=8)
     return figure
 
 
-def excitation_page(excitation: Excitation, svg: bytes) -> Page:
+def excitation_page(excitation: Excitation) -> Page:
     """The report of a search."""
     shown = "position, velocity, acceleration of every joint as a share of its limits, and torques, over time"
     return Page(
         title=f"{excitation.model.NAME}: exciting motion",
         verdict=excitation.verdict,
         sections=[
-            Section("Motion", images=[Image("The motion", svg, shown)], tables=[excitation.usage_table()]),
+            Section("Motion", images=[drawn("The motion", motion_figure(excitation), shown, "motion")], tables=[excitation.usage_table()]),
             Section("What it will tell", tables=[excitation.sigma_table()]),
             Section("Search", tables=[excitation.starts_table()]),
         ],

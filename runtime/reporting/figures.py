@@ -14,9 +14,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from runtime.identification.validation import Comparison, JointComparison
-from runtime.reporting.series import gaps
+from runtime.reporting.page import Image
+from runtime.reporting.panels import PanelLayout
+from runtime.reporting.series import Series, series
 from runtime.resolution.result import BIASED, NEGLIGIBLE, Cestac
 
 BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = "#000000", "#0072B2", "#D55E00", "#007A5A", "#AA4499", "#56B4E9", "#9A9A9A"
@@ -27,6 +30,7 @@ STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "axes.titley": 1.0,  # not sought
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.5,
     "legend.frameon": False,
@@ -35,8 +39,13 @@ STYLE: Any = {
     "path.simplify": True,
 }
 DPI = 150
-LAYOUT: Any = "constrained"
-"""How panels get their places; the search takes a third of the time of a figure."""
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def drawn(caption: str, figure: Figure, alt: str, name: str = "", series: Series | None = None) -> Image:
+    """The figure for a page.   name : of its files beside the page, PNG and SVG; none: the page alone has it."""
+    picture = svg(figure)
+    return Image(caption, picture, alt, series, {f"{name}.png": png(figure), f"{name}.svg": picture} if name else {})
 
 
 def svg(figure: Figure) -> bytes:
@@ -52,7 +61,7 @@ def png(figure: Figure) -> bytes:
 def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "measured") -> Figure:
     """Measured and predicted torque of one joint, and their difference below (chapter, Fig. 4). source : "measured" or "simulated"."""
     with mpl.rc_context(STYLE):
-        figure = empty_figure((5.4, 3.4))
+        figure = empty_figure((5.4, 3.4), layout=PanelLayout())
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         t, measured, predicted, error = _broken(joint)
         upper.plot(t, measured, color=BLACK, linewidth=1.5, label=source)
@@ -77,7 +86,7 @@ def torque_overlay(comparison: Comparison, unit: str = "N m", source: str = "mea
         figure, axes = panels_figure(rows, columns, (4.8 * columns, 2.3 * rows + 0.4), used=len(joints))
         for ax, joint in zip(axes, joints, strict=False):
             _overlay(ax, joint, unit, source)
-        shared_legend(figure, axes[0], 3)
+        shared_legend(figure, axes[:1], 3)
     return figure
 
 
@@ -113,7 +122,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
     e = np.array([level.e for level in levels]).reshape(len(levels), -1)
     coloured = [name for name in names if name in result.names] or _sharpest(result)
     with mpl.rc_context(STYLE):
-        figure, (ax,) = panels_figure(1, 1, (6.4, 4.4))
+        figure, (ax,) = panels_figure(1, 1, (6.4, 4.4), right=0.45, below=0.25)
         for name in result.deciding:
             if name not in coloured:
                 ax.plot(delta, _drawn(e[:, result.names.index(name)]), color="#C8C8C8", linewidth=0.8, zorder=1)
@@ -127,8 +136,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
             linewidth=1.8,
             label="residual, of |Y|",
         )
-        ax.set_xscale("log")
-        ax.set_yscale("log")
+        logarithmic(ax)
         ax.set_ylim(0.01, 1000)
         for limit in (NEGLIGIBLE, BIASED):
             ax.axhline(limit, color=BLACK, linewidth=0.9, linestyle=(0, (1, 2)))
@@ -136,10 +144,9 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
                 f"{limit:g} %", (1.0, limit), xycoords=("axes fraction", "data"), xytext=(3, 0), textcoords="offset points", va="center"
             )
         ax.set_xticks(delta, [level.level.label.replace("2*pi/", "2π/") for level in levels], rotation=30, ha="right", fontsize=8)
-        ax.set_xticks([], minor=True)
         ax.set_xlabel(f"resolution Δ, {unit}")
         ax.set_ylabel("%e: change of the estimate, %")
-        shared_legend(figure, ax, 4, size=8)
+        shared_legend(figure, [ax], 4, size=8)
     return figure
 
 
@@ -159,8 +166,9 @@ def _title(joint: JointComparison) -> str:
 
 
 def _broken(joint: JointComparison) -> tuple[np.ndarray, ...]:
-    holes = gaps(joint.t)
-    return tuple(np.insert(np.asarray(x, dtype=float), holes, np.nan) for x in (joint.t, joint.measured, joint.predicted, joint.error))
+    """Time, measured, predicted torque and error as they are drawn: as many instants as show."""
+    thinned = series(joint, "", "")
+    return thinned.t, thinned.first, thinned.second, thinned.first - thinned.second
 
 
 def _sharpest(result: Cestac) -> list[str]:
@@ -173,23 +181,41 @@ def _drawn(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values) & (values > 0), values, np.nan)
 
 
-def panels_figure(rows: int, columns: int, size: tuple[float, float], *, used: int | None = None) -> tuple[Figure, list[Axes]]:
-    """A figure of `size`, inch, and its panels row by row; those beyond `used` are blank."""
-    figure = empty_figure(size)
+def panels_figure(
+    rows: int, columns: int, size: tuple[float, float], *, used: int | None = None, right: float = 0.12, below: float = 0.0
+) -> tuple[Figure, list[Axes]]:
+    """A figure of `size`, inch, and its panels row by row; those beyond `used` are blank.
+
+    right, below : room for what stands to the right of a panel, and below it besides a line of ticks and a label, inch.
+    """
+    figure = empty_figure(size, layout=PanelLayout(right=right, below=below))
     axes = list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
     for ax in axes[used:] if used is not None else ():
         ax.set_visible(False)
     return figure, axes
 
 
-def shared_legend(figure: Figure, ax: Axes, columns: int, *, size: float = STYLE["font.size"]) -> None:
-    """The legend of one panel above the figure."""
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, ncols=columns, loc="outside upper center", fontsize=size)
+def shared_legend(figure: Figure, panels: Sequence[Axes], columns: int, *, size: float = STYLE["font.size"]) -> None:
+    """One legend of some panels above the figure, every label once."""
+    entries = {label: handle for ax in panels for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(list(entries.values()), list(entries), ncols=columns, loc="upper center", fontsize=size)
 
 
-def empty_figure(size: tuple[float, float]) -> Figure:
-    figure = Figure(figsize=size, layout=LAYOUT)
+def logarithmic(ax: Axes, axes: str = "xy") -> None:
+    """Logarithmic axes of a panel: 0.01, 1, 100, 10⁴; no ticks between the powers of ten."""
+    for name in axes:
+        ax.set(**{f"{name}scale": "log"})
+        axis = getattr(ax, f"{name}axis")
+        axis.set_major_formatter(FuncFormatter(_power))
+        axis.set_minor_locator(NullLocator())
+
+
+def _power(x: float, _: int) -> str:
+    return f"{x:g}" if 1e-3 < x < 1e4 else "10" + str(round(np.log10(x))).translate(RAISED)
+
+
+def empty_figure(size: tuple[float, float], layout: Any = "constrained") -> Figure:
+    figure = Figure(figsize=size, layout=layout)
     FigureCanvasAgg(figure)
     return figure
 

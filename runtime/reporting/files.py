@@ -17,12 +17,10 @@ from runtime.model.generated import joint_labels
 from runtime.motion.result import Simulation
 from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays
-from runtime.reporting.excitation import excitation_page, motion_figure
-from runtime.reporting.friction import friction_figure
-from runtime.reporting.page import Section, render
+from runtime.reporting.excitation import excitation_page
+from runtime.reporting.page import Page, Section, render
 from runtime.reporting.pages import advice_page, identification_page, resolution_page
 from runtime.reporting.physical import standard_csv
-from runtime.reporting.resolution_advice import advice_figure
 from runtime.reporting.sections import parameters_csv
 from runtime.reporting.simulation import simulation_figure
 from runtime.resolution.advice import Advice
@@ -90,9 +88,9 @@ def identification_files(
     """Files of an identification; title, warning, verdict, sections : as for `identification_page`."""
     unit, fit, study = result.torque_unit, result.model_estimate, study_text(result.study, folder)
     page = identification_page(result, study, title=title, warning=warning, verdict=verdict, sections=sections)
-    torques, residuals = plots.torque_overlay(result.comparison, unit, result.source), plots.residual_histogram(result.comparison, unit)
+    torques = plots.torque_overlay(result.comparison, unit, result.source)
     files: Files = {
-        "report.html": render(page),
+        **page_files(page),
         "estimate.json": result.to_json(),
         "parameters.csv": parameters_csv(result),
         "parameters.tex": fit.to_latex(blocks=1 if len(fit.names) <= ONE_BLOCK else 2),
@@ -100,11 +98,9 @@ def identification_files(
         "study.yaml": study,
         "torques.png": plots.png(torques),
         "torques.svg": plots.svg(torques),
-        "residuals.png": plots.png(residuals),
     }
     files |= {"standard_parameters.csv": standard_csv(result.model_estimate)} if result.feasible else {}
-    files |= {"friction.png": plots.png(friction_figure(result.friction, unit))} if result.friction else {}
-    files |= {} if result.advice is None else advice_files(result.advice)
+    files |= {} if result.advice is None else {"advice.json": result.advice.to_json()}
     return files | ({} if result.resolution is None else resolution_files(result.resolution))
 
 
@@ -123,13 +119,13 @@ def _(result: Ranking, folder: Path, study: Study) -> Files:
 @files_of.register
 def _(result: Cestac, folder: Path, study: Study) -> Files:
     text = study_text(study, folder)
-    return {"report.html": render(resolution_page(result, text)), "study.yaml": text, **resolution_files(result)}
+    return page_files(resolution_page(result, text)) | {"study.yaml": text, **resolution_files(result)}
 
 
 @files_of.register
 def _(result: Advice, folder: Path, study: Study) -> Files:
     text = study_text(study, folder)
-    return {"report.html": render(advice_page(result, text)), "study.yaml": text, **advice_files(result)}
+    return page_files(advice_page(result, text)) | {"study.yaml": text, "advice.json": result.to_json()}
 
 
 @files_of.register
@@ -149,13 +145,10 @@ def _(result: Simulation, folder: Path, study: Study) -> Files:
 @files_of.register
 def _(result: Excitation, folder: Path, study: Study) -> Files:
     """The motion as samples and by its coefficients, its figures of merit, the figure."""
-    figure = motion_figure(result)
-    return {
-        "report.html": render(excitation_page(result, plots.svg(figure))),
+    return page_files(excitation_page(result)) | {
         "excitation.json": json_text(result.summary()),
         "trajectory.csv": result.to_csv(),
         "motion.yaml": yaml_text({"motion": result.motion.to_mapping()}),
-        "motion.png": plots.png(figure),
     }
 
 
@@ -164,21 +157,12 @@ def _(result: Fleet, folder: Path, study: Study) -> Files:
     return {"summary.txt": f"{result}\n", "summary.csv": result.to_csv(), "summary.json": result.to_json()}
 
 
-def resolution_files(result: Cestac, *, curve: Cestac | None = None, names: Sequence[str] = ()) -> Files:
-    """The study in every format, and the figure where a position is perturbed.
+def page_files(page: Page) -> Files:
+    """The page, and its figures beside it."""
+    return {"report.html": render(page), **page.files}
 
-    curve : the study that the figure shows; default: `result`.   names : parameters drawn in colour.
-    """
+
+def resolution_files(result: Cestac) -> Files:
+    """The study in every format."""
     files: Files = {"cestac.json": result.to_json(), "cestac.csv": cestac_csv(result), "cestac.tex": result.to_latex()}
-    files |= array_files("cestac", cestac_arrays(result))
-    shown = curve or result
-    if any(level.level.delta and not level.level.torque for level in shown.levels):
-        figure = plots.error_against_resolution(shown, names)
-        files |= {"resolution.png": plots.png(figure), "resolution.svg": plots.svg(figure)}
-    return files
-
-
-def advice_files(advice: Advice) -> Files:
-    """advice.json and the figure."""
-    figure = advice_figure(advice)
-    return {"advice.json": advice.to_json(), "advice.png": plots.png(figure), "advice.svg": plots.svg(figure)}
+    return files | array_files("cestac", cestac_arrays(result))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from runtime.identification.friction import FrictionCurve
 from runtime.markup import number
 from runtime.reporting import figures as plots
-from runtime.reporting.page import Image, Section
+from runtime.reporting.page import Section
 from runtime.table import Table
 
 
@@ -35,8 +35,7 @@ def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figur
             ax.set_ylabel(f"friction, {unit}")
             ax.axhline(0, color=plots.GREY, linewidth=0.6)
             ax.axvline(0, color=plots.GREY, linewidth=0.6)
-        entries = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-        figure.legend(list(entries.values()), list(entries), ncols=2 * columns, loc="outside upper center")
+        plots.shared_legend(figure, axes, 2 * columns)
     return figure
 
 
@@ -56,8 +55,11 @@ def friction_section(curves: Sequence[FrictionCurve], unit: str = "N m") -> Sect
         "blocks of time that did not fit it at least 1 % better and passes the F-test, which counts independent samples.",
         *(f"Joint {curve.joint}: {curve.note}." for curve in curves if curve.note),
     )
-    image = Image(
-        "Friction against velocity", plots.svg(friction_figure(curves, unit)), "Friction torque against velocity, joint by joint, with laws"
+    image = plots.drawn(
+        "Friction against velocity",
+        friction_figure(curves, unit),
+        "Friction torque against velocity, joint by joint, with laws",
+        "friction",
     )
     tables = [
         Table("Laws compared", ("joint", "law", "error %", "held-out error %", "AIC against the first", "p of the F-test"), compared),

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from runtime.identification.operational_space import OperationalSpace
 from runtime.markup import number
 from runtime.reporting import figures as plots
-from runtime.reporting.page import Image, Section
+from runtime.reporting.page import Section
 from runtime.table import Table
 
 Array = np.ndarray
@@ -44,7 +44,8 @@ def operational_space_figure(space: OperationalSpace, shape: tuple[int, int], ax
     """
     x, y = (space.position[:, k].reshape(shape) for k in axes)
     with mpl.rc_context(plots.STYLE):
-        figure, drawn = plots.panels_figure(2, 2, (8.2, 6.4))
+        figure = plots.empty_figure((8.2, 6.4))
+        drawn = figure.subplots(2, 2).ravel()
         for ax, (title, (value, _)) in zip(drawn, panels(space).items(), strict=True):
             usual = value[np.isfinite(value)]
             lowest, high = float(usual.min()), float(np.quantile(usual, 0.9))
@@ -73,10 +74,11 @@ def operational_space_section(
             f"{number(float(value[k]), '.3g')} +- {number(float(sigma[k]), '.1g')}" for k in (order[0], order[len(order) // 2], order[-1])
         ]
         rows.append((title, *cells, number(float(100 * np.median(sigma[known] / np.abs(value[known]))), ".2g")))
-    image = Image(
+    image = plots.drawn(
         "What the user feels at the handle, motors off; crosses: singular configurations, where nothing is told",
-        plots.svg(operational_space_figure(space, shape, axes, labels)),
+        operational_space_figure(space, shape, axes, labels),
         "Four maps over the workspace: smallest and largest apparent mass, friction, stiffness",
+        "handle",
     )
     table = Table("Over the sheet", ("felt", "smallest", "median", "largest", "median %sigma"), rows)
     notes = [*text, *([space.message] if space.message else [])]

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 from base64 import b64encode
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from hashlib import sha256
 from importlib.resources import files
@@ -62,12 +62,15 @@ class Image:
         What the figure shows, for those who do not see it.
     series : Series or None
         What a script draws in its place.
+    files : mapping of str to bytes
+        The figure in every format that is written beside the page, by file name.
     """
 
     caption: str
     svg: bytes
     alt: str
     series: Series | None = None
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def data(self) -> str:
@@ -129,6 +132,11 @@ class Page:
     answer: str = ""
     remarks: Sequence[tuple[str, str]] = ()
     numbers: Sequence[Number] = ()
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """Figures that are written beside the page, by file name."""
+        return {name: content for section in self.sections for image in section.images for name, content in image.files.items()}
 
 
 def state_mark(state: State) -> Markup:

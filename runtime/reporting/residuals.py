@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from runtime.identification.residuals import Whiteness
 from runtime.identification.result import Identification
 from runtime.observation.decimation import CUTOFF
-from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, panels_figure, residual_histogram, shared_legend, svg
-from runtime.reporting.page import Image, Section
+from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, drawn, logarithmic, panels_figure, residual_histogram, shared_legend
+from runtime.reporting.page import Section
 
 
 def residual_section(result: Identification, unit: str = "N m") -> Section:
@@ -32,15 +32,16 @@ def residual_section(result: Identification, unit: str = "N m") -> Section:
             f"The rows come {result.observation.rate:g} times a second; the filter of the decimation ends at {cutoff:g} Hz (dotted)."
         )
     images = [
-        Image(
+        drawn(
             "Spectral density of the residuals",
-            svg(spectra_figure(joints, unit, cutoff)),
+            spectra_figure(joints, unit, cutoff),
             "Spectral density of the residuals of every joint, by frequency",
         ),
-        Image(
+        drawn(
             "Residuals over their deviation; line: normal law",
-            svg(residual_histogram(result.comparison, unit)),
+            residual_histogram(result.comparison, unit),
             "Histograms of the residuals, joint by joint",
+            "residuals",
         ),
     ]
     return Section("Residuals: spectrum and distribution", text, images)
@@ -60,15 +61,15 @@ def spectra_figure(joints: Sequence[Whiteness], unit: str = "N m", cutoff: float
     with mpl.rc_context(STYLE):
         figure, axes = panels_figure(rows, columns, (max(5.4, 3.2 * columns), 2.0 * rows + 0.6), used=len(joints))
         for ax, w in zip(axes, joints, strict=False):
-            drawn = w.density > 0
-            ax.semilogy(w.frequency[drawn], w.density[drawn], color=BLUE, linewidth=1.1, label="residuals")
+            positive = w.density > 0
+            ax.plot(w.frequency[positive], w.density[positive], color=BLUE, linewidth=1.1, label="residuals")
             ax.axhline(float(np.mean(w.density)) or 1.0, color=ORANGE, linewidth=1.0, linestyle="--", label="white, same power")
             ax.axvline(w.half, color=GREY, linewidth=0.9, label="half of the power below")
             if cutoff is not None:
                 ax.axvline(cutoff, color=BLACK, linewidth=1.1, linestyle=(0, (1, 2)), label="cut-off of the decimation")
-            ax.minorticks_off()
+            logarithmic(ax, "y")
             ax.set_title(f"joint {w.joint}", fontsize=9)
             ax.set_xlabel("frequency, Hz")
-        figure.supylabel(f"density, ({unit})²/Hz", fontsize=9)
-        shared_legend(figure, axes[0], 2, size=8)
+        figure.supylabel(f"density, ({unit})²/Hz", fontsize=9, x=0.005)
+        shared_legend(figure, axes[:1], 2, size=8)
     return figure

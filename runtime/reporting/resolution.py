@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from runtime.reporting import figures as plots
-from runtime.reporting.page import Image, Number, Section, State
+from runtime.reporting.page import Number, Section, State
 from runtime.resolution.result import Cestac
 
 
@@ -13,14 +13,15 @@ def resolution_section(
     result: Cestac, title: str = "Encoder resolution", *, curve: Cestac | None = None, names: Sequence[str] = ()
 ) -> Section:
     """Table 3 of the chapter with %e and %sigma, both readings of %e(rho), and the curve of %e against Delta."""
-    drawn = curve or result
-    several = sum(1 for r in drawn.levels if r.level.delta and not r.level.torque) > 0
+    shown = curve or result
+    several = sum(1 for r in shown.levels if r.level.delta and not r.level.torque) > 0
     image = (
-        Image(
+        plots.drawn(
             "%e against resolution; dotted: the limits of the verdict, 1 % and 5 %; dashed: increase of the residual norm in % of |Y|; grey: the "
             "other parameters that decide",
-            plots.svg(plots.error_against_resolution(drawn, names)),
+            plots.error_against_resolution(shown, names),
             "Change of the estimates in per cent against encoder resolution, logarithmic axes",
+            "resolution",
         )
         if several
         else None

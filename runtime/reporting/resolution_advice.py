@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, panels_figure, shared_legend, svg
-from runtime.reporting.page import Image, Section
+from runtime.reporting.figures import BLACK, BLUE, GREY, ORANGE, STYLE, drawn, logarithmic, panels_figure, shared_legend
+from runtime.reporting.page import Section
 from runtime.resolution.advice import NAMES, Advice, EncoderAdvice
 
 COLUMNS = 5
@@ -35,9 +35,9 @@ def advice_figure(advice: Advice) -> Figure:
             ax.set_title(name, fontsize=9)
         for k, ax in enumerate(axes[: len(names)]):
             ax.tick_params(labelleft=k % columns == 0, labelbottom=k + columns >= len(names), labelsize=7)
-        shared_legend(figure, axes[0], 4, size=8)
+        shared_legend(figure, axes[:1], 4, size=8)
         figure.supxlabel(f"resolution Δ of every encoder, {advice.unit}", fontsize=9)
-        figure.supylabel("%e: change of the estimate, %", fontsize=9)
+        figure.supylabel("%e: change of the estimate, %", fontsize=9, x=0.005)
     return figure
 
 
@@ -63,17 +63,17 @@ def _panel(ax: Axes, reader: str, encoder: EncoderAdvice, line: str, points: str
         ax.axhline(limit.percent, color=BLACK, linewidth=0.8, linestyle=(0, (1, 2)))
         if np.isfinite(limit.delta):
             ax.axvline(limit.delta, color=GREY, linewidth=0.8)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    logarithmic(ax)
     ax.set_ylim(LOWEST, HIGHEST)
 
 
 def advice_section(advice: Advice) -> Section:
     """Steps by encoder and by parameter, the figure, the assumptions."""
-    image = Image(
+    image = drawn(
         "%e against resolution: predicted curve and sampled points of every parameter that matters; dotted: 1 % and 5 %; grey: the steps advised",
-        svg(advice_figure(advice)),
+        advice_figure(advice),
         "Change of every parameter in per cent against encoder resolution, predicted and sampled, logarithmic axes",
+        "advice",
     )
     return Section(
         "Resolution advice",

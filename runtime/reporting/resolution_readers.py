@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import StrMethodFormatter
 
 from runtime.markup import number
-from runtime.reporting.figures import BLACK, BLUE, ORANGE, STYLE, panels_figure, shared_legend, svg
-from runtime.reporting.page import Image, Section
+from runtime.reporting.figures import BLACK, BLUE, ORANGE, STYLE, drawn, logarithmic, panels_figure, shared_legend
+from runtime.reporting.page import Section
 from runtime.resolution.result import BIASED, NEGLIGIBLE, Cestac
 from runtime.table import Table
 
@@ -32,7 +31,7 @@ def readers_figure(by_positions: Cestac, by_counts: Cestac, names: Sequence[str]
     i = by_positions.names.index(key)
     unit = by_positions.reference.units.get(key, "").replace("**", "^").replace("*", " ")
     with mpl.rc_context(STYLE):
-        figure, (left, right) = panels_figure(1, 2, (9.6, 4.2))
+        figure, (left, right) = panels_figure(1, 2, (9.6, 4.2), below=0.25)
         for result, (label, color, marker) in zip((by_positions, by_counts), READ, strict=True):
             delta, rms, largest = errors(result, names)
             left.plot(delta, rms, color=color, marker=marker, markersize=5, linewidth=1.6, label=label)
@@ -53,8 +52,7 @@ def readers_figure(by_positions: Cestac, by_counts: Cestac, names: Sequence[str]
         right.axhline(by_positions.reference.X[i], color=BLACK, linewidth=0.9, linestyle="--")
         right.annotate("as recorded", (1.0, by_positions.reference.X[i]), xycoords=("axes fraction", "data"), xytext=(-4, 4),
                        textcoords="offset points", ha="right", fontsize=8)  # fmt: skip
-        left.set_yscale("log")
-        left.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        logarithmic(left, "y")
         left.set_ylabel("%e: change of the estimate, %")
         left.set_title(f"rms of {len(names)} parameters; shaded: up to the largest", fontsize=9)
         right.set_ylim(min(0.0, right.get_ylim()[0]), None)
@@ -62,13 +60,12 @@ def readers_figure(by_positions: Cestac, by_counts: Cestac, names: Sequence[str]
         right.set_title(f"mean of {key} with the spread of the runs", fontsize=9)
         delta = errors(by_positions, names)[0]
         for ax in (left, right):
-            ax.set_xscale("log")
+            logarithmic(ax, "x")
             ax.set_xticks(
                 delta, [level.level.label.replace("2*pi/", "2π/") for level in by_positions.levels], rotation=30, ha="right", fontsize=8
             )
-            ax.set_xticks([], minor=True)
             ax.set_xlabel("step of every encoder")
-        shared_legend(figure, left, 2, size=9)
+        shared_legend(figure, [left], 2, size=9)
     return figure
 
 
@@ -91,9 +88,10 @@ def readers_table(by_positions: Cestac, by_counts: Cestac, names: Sequence[str],
 
 def readers_section(by_positions: Cestac, by_counts: Cestac, names: Sequence[str], key: str, text: Sequence[str] = ()) -> Section:
     """Figure and table."""
-    image = Image(
+    image = drawn(
         "%e against the step, and the mean of one parameter; squares: counts taken as positions; circles: counts read as counts; dotted: 1 % and 5 %",
-        svg(readers_figure(by_positions, by_counts, names, key)),
+        readers_figure(by_positions, by_counts, names, key),
         "Change of the estimates against encoder step by both readers, logarithmic axes",
+        "counts",
     )
     return Section("The same encoders read both ways", text, [image], [readers_table(by_positions, by_counts, names, key)])

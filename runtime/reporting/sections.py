@@ -9,7 +9,7 @@ from runtime.identification.result import Identification
 from runtime.markup import number
 from runtime.reporting import figures as plots
 from runtime.reporting.correlations import correlation_section
-from runtime.reporting.page import Image, Section
+from runtime.reporting.page import Section
 from runtime.reporting.parameters import parameter_section
 from runtime.reporting.plausibility import plausibility_section
 from runtime.reporting.residuals import residual_section
@@ -49,11 +49,11 @@ def torque_section(result: Identification) -> Section:
     unit = result.torque_unit
     columns = {"essential": "the essential", "feasible": "the physical", "all": "all"}[result.model_columns]
     images = [
-        Image(
+        plots.drawn(
             f"Joint {joint.joint}: {result.source}, predicted by {columns} parameters, and error below; {joint.relative_error:.2f} % of the {result.source} norm",
-            plots.svg(plots.joint_overlay(joint, unit, result.source)),
+            plots.joint_overlay(joint, unit, result.source),
             f"Torque of joint {joint.joint} against time: {result.source}, predicted, error; error {joint.relative_error:.1f} %",
-            series(joint, unit, result.source),
+            series=series(joint, unit, result.source),
         )
         for joint in result.comparison
     ]

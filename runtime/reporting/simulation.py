@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
+import numpy as np
 
 from runtime.reporting.figures import BLUE, GREY, ORANGE, STYLE, panels_figure
+from runtime.reporting.series import MOST, extremes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,6 +46,7 @@ def simulation_figure(joints: Sequence[str], simulation: Simulation, units: Sequ
 
 
 def _lines(ax: Any, t: Any, label: str, *lines: tuple[Any, str, str]) -> None:
+    kept = extremes(np.array([x for x, _, _ in lines]), MOST)
     for x, color, name in lines:  # the first of two shows behind the second
-        ax.plot(t, x, linewidth=2.4 if color == GREY else 0.9, color=color, label=name)
+        ax.plot(t[kept], x[kept], linewidth=2.4 if color == GREY else 0.9, color=color, label=name)
     ax.set_ylabel(label, fontsize=8)

@@ -17,12 +17,11 @@ from typing import Literal
 
 import runtime
 from runtime import Cestac, Study
-from runtime.reporting import figures as plots
-from runtime.reporting.files import Files, resolution_files
-from runtime.reporting.page import Page, render
+from runtime.reporting.files import Files, page_files, resolution_files
+from runtime.reporting.page import Page
 from runtime.reporting.pages import settings_section
 from runtime.reporting.resolution import resolution_section
-from runtime.reporting.resolution_readers import errors, readers_figure, readers_section, readers_table
+from runtime.reporting.resolution_readers import errors, readers_section, readers_table
 from runtime.settings.location import located, study_text
 from runtime.settings.study import CestacSettings
 from symgen.demo.simulated_record import Prepared
@@ -114,11 +113,11 @@ class Demonstration:
                 settings_section(text),
             ],
         )
-        figure = readers_figure(self.by_positions, self.by_counts, self.names, KEY)
-        files: Files = {"report.html": render(page), "study.yaml": text, **resolution_files(self.by_counts)}
-        files |= {"positions.json": self.by_positions.to_json(), "counts.png": plots.png(figure), "counts.svg": plots.svg(figure)}
         return {
-            **files,
+            **page_files(page),
+            "study.yaml": text,
+            **resolution_files(self.by_counts),
+            "positions.json": self.by_positions.to_json(),
             "readers.txt": readers_table(self.by_positions, self.by_counts, self.names, KEY).to_text() + "\n",
             **self.prepared.files,
         }

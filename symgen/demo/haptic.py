@@ -15,9 +15,8 @@ from runtime import Cestac, Identification
 from runtime.identification.operational_space import OperationalSpace, operational_space
 from runtime.markup import number
 from runtime.model.drives import Drives
-from runtime.reporting import figures as plots
 from runtime.reporting.files import Files, identification_files, resolution_files
-from runtime.reporting.operational_space import operational_space_figure, operational_space_section
+from runtime.reporting.operational_space import operational_space_section
 from runtime.reporting.page import Section
 from runtime.reporting.resolution import resolution_section
 from runtime.resolution.result import BIASED, NEGLIGIBLE, LevelResult
@@ -111,10 +110,8 @@ class Demonstration:
             "verdict": self.verdict,
             "warning": "No record of this interface is public.",
         }
-        maps = operational_space_figure(self.handle, SHEET, FACES, LABELS)
         files = identification_files(result, folder, sections=sections(self), **page)
-        files |= resolution_files(self.resolution, names=MAIN)
-        return {**files, "handle.png": plots.png(maps), "handle.svg": plots.svg(maps), **self.prepared.files}
+        return {**files, **resolution_files(self.resolution), **self.prepared.files}
 
 
 def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], None] = lambda step: None) -> Demonstration:

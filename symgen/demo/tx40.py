@@ -131,7 +131,7 @@ class Demonstration:
             "warning": "The measured record was not available." if self.simulated else "",
         }
         files = identification_files(result, folder, sections=sections(self), **page)
-        return {**files, **resolution_files(self.resolution, curve=self.curve, names=COLOURED), **self.prepared.files}
+        return {**files, **resolution_files(self.resolution), **self.prepared.files}
 
 
 def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], None] = lambda step: None) -> Demonstration:

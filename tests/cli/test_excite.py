@@ -52,7 +52,14 @@ def test_motion_from_a_record(study: Path, tmp_path: Path) -> None:
     }
     assert summary["settings"]["criterion"] == "record"
     assert max(max(x) for x in summary["limits_used"].values()) <= 1
-    assert {p.name for p in out.iterdir()} == {"report.html", "excitation.json", "trajectory.csv", "motion.yaml", "motion.png"}
+    assert {p.name for p in out.iterdir()} == {
+        "report.html",
+        "excitation.json",
+        "trajectory.csv",
+        "motion.yaml",
+        "motion.png",
+        "motion.svg",
+    }
     table = np.genfromtxt(out / "trajectory.csv", delimiter=",", names=True)
     assert table.dtype.names == ("t", "q1", "qd1", "qdd1")
     motion = motion_from_mapping(YAML(typ="safe").load((out / "motion.yaml").read_text())["motion"])

@@ -18,7 +18,7 @@ from symgen.cli.main import app
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 FILES = {"report.html", "estimate.json", "estimate.mat", "estimate.npz", "parameters.csv", "parameters.tex"}
-FILES |= {"study.yaml", "torques.png", "torques.svg", "residuals.png"}
+FILES |= {"study.yaml", "torques.png", "torques.svg", "residuals.png", "residuals.svg"}
 
 
 def run(*arguments):
