@@ -16,11 +16,15 @@ import numpy as np
 from scipy.special import erf
 
 from runtime.observation.count_smoother import Lines, Smoothed, smoothed
-from runtime.observation.encoder_lattice import Lattice, lattice, unwrapped
+from runtime.observation.encoder_lattice import SHAKEN, Lattice, lattice, shaken_share, to_and_fro, unwrapped
 
 Array = np.ndarray
 
 STRETCH, MARGIN = 65536, 4096
+ANYWHERE = 12**-0.5
+"""Error of a line where the motion shakes, steps: a change of the count then says as much as the count itself, a position within one step."""
+TURNED = 4e-3
+"""Time ahead of a count that goes to and fro and behind it in which both directions occur, s: a quarter of a period of usual cut-offs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +155,8 @@ def _reading(counts: Array, rate: float, known: Lattice, lines: Lines, said: Seq
 def read_stretch(counts: Array, rate: float, lines: Lines) -> tuple[Part | None, list[Array]]:
     """Posterior of counts, shape (N, n), and q, qd, qdd, s_q, s_qd, s_qdd, shape (N, n) each, in steps; None where nothing moves.
 
-    An encoder whose count never changes rests in the middle of its interval.
+    An encoder whose count never changes rests in the middle of its interval. Where one count goes to and fro the lines of all encoders are widened,
+    since joints share a controller, and directions near such passages are uncertain.
     """
     N, n = counts.shape
     k = np.ascontiguousarray(counts.T)
@@ -160,10 +165,18 @@ def read_stretch(counts: Array, rate: float, lines: Lines) -> tuple[Part | None,
     states[0][:] = np.nanmean(k, axis=1)
     if not len(moving):
         return None, states
-    part = Part(smoothed(k[moving], 1 / rate, lines=lines), 0, 0, N, moving)
+    known = [np.flatnonzero(np.isfinite(k[j])) for j in moving]
+    shaken = isinstance(lines, str) and max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
+    part = Part(smoothed(k[moving], 1 / rate, lines=ANYWHERE if shaken else lines), 0, 0, N, moving)
     for order in range(3):
         for i, x in zip((order, order + 3), part.smoothed.state(order), strict=True):
             states[i][:, moving] = x.T
+    for j, at in zip(moving, known, strict=True) if shaken else ():
+        turned = np.zeros(N, dtype=bool)
+        for a, b in at[to_and_fro(k[j, at])]:
+            turned[max(a - round(TURNED * rate), 0) : b + round(TURNED * rate)] = True
+        deviation = 3 * np.abs(states[1][turned, j])  # speeds of both signs: their deviation is above their mean
+        states[4][turned, j] = np.maximum(states[4][turned, j], deviation)
     return part, states
 
 

@@ -22,6 +22,10 @@ FAST = 20
 """Median change of the count from sample to sample, where it changes, above which a record tells of positions alone."""
 JUMP = 30
 """A change of the count this many times its neighbours is none of a motion."""
+SHAKEN = 0.01
+"""Share of the changes of an encoder that cross a line the third time in a row, from which its motion counts as shaken."""
+FEWEST = 100
+"""Changes from which a share is one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +64,16 @@ def lattice(
         raise InputError(f"phase {np.shape(phase)}; expected ({n},), one for each encoder", file=name)
     if not any(np.nanmax(x) > np.nanmin(x) for x in position.T if np.isfinite(x).any()):
         raise InputError("no position changes: counts that never change say nothing of a motion; record one", file=name)
-    steps, phases, findings = np.empty(n), np.empty(n), []
+    steps, phases, shares, findings = np.empty(n), np.empty(n), np.zeros(n), []
     for j in range(n):
         x, label = position[np.isfinite(position[:, j]), j], f"encoder {j + 1}"
         if not len(x):
             raise InputError(f"{label}: no sample is known", file=name)
         steps[j], said = _step(x, None if step is None else float(step[j]), label, name)
         phases[j] = _phase(x, steps[j]) if phase is None else phase[j]
-        findings += [*said, *_speed(np.diff(np.round((x - phases[j]) / steps[j])), label)]
+        counts = np.round((x - phases[j]) / steps[j])
+        findings += [*said, *_speed(np.diff(counts), label)]
+        shares[j] = shaken_share(counts)
         off = _distance(x, steps[j], phases[j])
         if off > OFF:
             raise InputError(
@@ -79,6 +85,12 @@ def lattice(
             findings.append(
                 f"{label}: positions lie {off:.2g} steps (rms) off the lattice of step {steps[j]:.6g}, as if rounded to few digits"
             )
+    if shares.max() > SHAKEN:
+        findings.append(
+            f"encoder {np.argmax(shares) + 1}: {100 * shares.max():.0f} % of its changes cross one line to and fro; the motion shakes, as under a controller "
+            "that answers single counts. Counts are read as positions within one step, and stated deviations are those of the smooth motion alone: "
+            "do not trust those of velocities and accelerations"
+        )
     if step is None:
         findings.insert(0, f"steps from the record: {', '.join(f'{x:.6g}' for x in steps)}")
     return Lattice(steps, phases, tuple(findings))
@@ -96,6 +108,23 @@ def smallest_step(x: Array) -> float:
         near = gaps[gaps < 20.5 * least]
         least = float(near.sum() / np.round(near / least).sum())
     return least
+
+
+def to_and_fro(counts: Array) -> Array:
+    """Samples ahead of the first and behind the last of three changes in a row over one line, shape (m, 2); counts, shape (N,), none missing.
+
+    A smooth motion crosses a line once, and twice where it turns back between two lines.
+    """
+    change = np.diff(counts)
+    at = np.flatnonzero(change)
+    same = np.diff(counts[at] + change[at] / 2) == 0
+    third = np.flatnonzero(same[1:] & same[:-1])
+    return np.stack([at[third], at[third + 2] + 1], axis=1)
+
+
+def shaken_share(counts: Array) -> float:
+    """Changes that end such a passage over all changes."""
+    return len(to_and_fro(counts)) / max(int(np.count_nonzero(np.diff(counts))), FEWEST)
 
 
 def unwrapped(counts: Array, *, name: str = "record") -> tuple[Array, tuple[str, ...]]:

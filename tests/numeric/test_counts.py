@@ -104,6 +104,29 @@ def test_deviations_are_true_at_every_speed(per_turn):
     assert (np.abs(reading.sign[np.abs(qd) > 6 * reading.s_qd]) > 0.99).all()
 
 
+def test_a_motion_that_answers_its_counts_is_told_and_read_as_smooth():
+    """Its controller sees the counts, so that between lines it accelerates and at each it is thrown back: no prior of smooth motion knows that."""
+    q, qd, _ = (x[:, 0] for x in moved())
+    step, kp, kd = 0.01, 4e4, 400.0
+    x, v, y, before, positions, speeds = q[0], qd[0], q[0], q[0], [], []
+    for r, rd in zip(q, qd, strict=True):
+        before, y = y, step * np.round(x / step)
+        a = kp * (r - y) + kd * (rd - (y - before) * RATE)
+        positions.append(x)
+        speeds.append(v)
+        x, v = x + v / RATE + a / 2 / RATE**2, v + a / RATE
+    counts = step * np.round(np.array(positions)[:, None] / step)
+    inner, off = slice(400, -400), {}
+    for lines in ("detected", 0.01):
+        reading = read_counts(counts, RATE, step, lines=lines)
+        off[lines] = np.sqrt(np.mean(((reading.q[:, 0] - positions) / reading.s_q[:, 0])[inner] ** 2))
+    assert off["detected"] < 2 < 4 < off[0.01]
+    assert any("cross one line to and fro" in text for text in reading.findings)
+    certain = reading.s_qd[:, 0] < np.abs(reading.qd[:, 0])
+    assert certain.mean() > 0.8 and (np.sign(reading.qd[:, 0]) == np.sign(speeds))[certain].mean() > 0.95
+    assert not any("to and fro" in text for text in read_counts(counted(q[:, None], step), RATE, step).findings)
+
+
 def test_draws_have_the_stated_deviation():
     q, _, _ = moved()
     reading = read_counts(counted(q, 0.01), RATE, 0.01)
