@@ -112,8 +112,8 @@ class Checklist:
         """The largest doubt, in a sentence."""
         if self.worst is not None:
             return f"{self.worst.question} {self.worst.finding}."
-        unanswered = [check.question.rstrip("?") for check in self.checks if check.state == "open"]
-        return "none among the checks below" + (f"; not judged: {'; '.join(unanswered)}." if unanswered else ".")
+        unanswered = [check.question for check in self.checks if check.state == "open"]
+        return f"none among the checks below. Not judged: {' '.join(unanswered)}" if unanswered else "none among the checks below."
 
     @property
     def next(self) -> str:
@@ -269,7 +269,8 @@ def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool
         "see in which parameters the records differ: another robot, load or wiring, or a motion that one of them does not excite"
         if differ
         else ("name a record that it has to predict (validate.record); " if halves else "")
-        + "fewer parameters (a larger essential.threshold), a longer or richer record",
+        + ("" if "standard" in fit.details else "fewer parameters (a larger essential.threshold), ")
+        + "a longer or richer record",
     )
 
 
@@ -341,7 +342,7 @@ def physical(estimate: Estimate, feasibility: Feasibility | None) -> Check:
         return Check(question, "good", f"Yes, margin {feasibility.margin:.2g}", limit)
     blocking = ", ".join(name for name, _ in feasibility.blocking)
     remedy = "before you simulate or control with them, fit under these conditions (estimate: {method: feasible}); torque prediction is not concerned"
-    return Check(question, "doubtful", f"No: in the way are {blocking}", limit, remedy)
+    return Check(question, "doubtful", f"No: no body has what the fit of all parameters gives {blocking}", limit, remedy)
 
 
 def resolved(advice: Advice | None) -> Check:
@@ -355,7 +356,7 @@ def resolved(advice: Advice | None) -> Check:
     )
     text = f"Least squares stays within {steps} {advice.place}"
     if not advice.asked:
-        remedy = "compare these steps with that of your encoder (--encoder STEP, --side motor where it sits there)"
+        remedy = "say which step your encoder has (symgen report --encoder STEP, --side motor where it sits there)"
         return Check(question, "open", text, limit, remedy)
     name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
     labels = ", ".join(Level(step).label for step in advice.asked)

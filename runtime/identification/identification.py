@@ -26,7 +26,7 @@ from runtime.identification.payload_study import payload_study
 from runtime.identification.plausibility.plausibility import plausibility
 from runtime.identification.result import Identification
 from runtime.identification.uncertainty import uncertainty
-from runtime.identification.validation import direct_comparison, sets_validation, split_sets, weak_directions
+from runtime.identification.validation import CrossValidation, direct_comparison, sets_validation, split_sets, weak_directions
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import physical_model
 from runtime.observation.system import halves
@@ -114,13 +114,18 @@ def identify(
     windows = study.validate.split or halves(*observation.span)
     names = record_names([*records, *further])
     fitted, others = ", ".join(names[: len(records)]), names[len(records) :]
-    at("validation")
-    try:
-        validation = [split_sets(observation, windows, how, model=model)]
-    except InputError as e:
-        validation, missing = [], [*missing, f"validation between windows of the record: {e}"]
+    validation: list[CrossValidation] = []
+    ended = fit.status == "ok" or study.estimate.method in LINEAR  # else each validation would simulate a loop that is wrong once more
+    if ended:
+        at("validation")
+        try:
+            validation = [split_sets(observation, windows, how, model=model)]
+        except InputError as e:
+            missing = [*missing, f"validation between windows of the record: {e}"]
+    else:
+        missing = [*missing, f"validation: {study.estimate.method} ended with status {fit.status}"]
     parts = {name: observed([record], windows=()) for name, record in zip(others, further, strict=True)}
-    if parts:
+    if parts and ended:
         known = sets or {"all": fit}
         validation.append(sets_validation(observation, parts, how, name=fitted, model=model, fitted=known))
     missing += [text for part in validation for text in part.missing]

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.methods import LINEAR
@@ -230,9 +232,10 @@ class Identification:
             return f"No values of {self.model.NAME}: {self.estimate.method} ended with status {self.estimate.status}. {reason}."
         worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
         by_joint = f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)" if self.observation.n > 1 else ""
+        unseen = f", and {self.prediction_error:.1f} % of {self.unseen}" if np.isfinite(self.prediction_error) else ""
         return (
-            f"{len(fit.names)} of {len(self.estimate.names)} parameters carry the model of {self.model.NAME}: they leave {fit.relative_error:.1f} % "
-            f"of the torques of the {self._of_record} unexplained{by_joint}, and {self.prediction_error:.1f} % of {self.unseen}."
+            f"The model of {self.model.NAME} with {len(fit.names)} of {len(self.estimate.names)} parameters leaves {fit.relative_error:.1f} % "
+            f"of the torques of the {self._of_record} unexplained{by_joint}{unseen}."
         )
 
     @property

@@ -9,8 +9,9 @@ from runtime.table import Table
 
 
 def checks_section(checklist: Checklist) -> Section:
-    """Question, answer, limit, remedy."""
-    rows = [(c.question, state_mark(c.state), c.finding, c.limit, "" if c.state == "good" else c.remedy) for c in checklist.checks]
+    """Question, answer, limit, remedy; what is not good first."""
+    ordered = sorted(checklist.checks, key=lambda check: ("no", "doubtful", "open", "good").index(check.state))
+    rows = [(c.question, state_mark(c.state), c.finding, c.limit, "" if c.state == "good" else c.remedy) for c in ordered]
     table = Table(
         "The verdict is the worst of these",
         ("question", "answer", "found", "good within", "what to do"),
@@ -26,7 +27,7 @@ def key_numbers(result: Identification) -> list[Number]:
     fit = result.model_estimate
     worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
     numbers = [
-        Number("parameters that carry the model", f"{len(fit.names)} of {len(result.estimate.names)}"),
+        Number("parameters of the model", f"{len(fit.names)} of {len(result.estimate.names)}"),
         Number("error where fitted", f"{fit.relative_error:.1f} %"),
         Number("error on unseen data", f"{result.prediction_error:.1f} %"),
     ]
@@ -35,7 +36,7 @@ def key_numbers(result: Identification) -> list[Number]:
     return [
         *numbers,
         Number(
-            "torque samples used, worth of independent ones",
+            "torque samples, worth of independent ones",
             f"{fit.rows}, {sum(w.effective_rows for w in result.uncertainty.whiteness):.0f}",
         ),
         Number("condition number, unit columns", rounded(fit.cond_unit)),

@@ -32,7 +32,7 @@ def record(tmp_path):
 def test_measured_record_of_one_joint(emps_data, tmp_path):
     result = run("emps", "emps", "-o", tmp_path / "out", "--encoder", "1e-6")
     assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("Yes. 4 of 4 parameters carry the model of emps")
+    assert result.stdout.startswith("Yes. The model of emps with 4 of 4 parameters leaves")
     assert {path.name for path in (tmp_path / "out").iterdir()} >= FILES
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     for words in ("physically feasible", "Friction curves", "Resolution advice", "Resolution study", "95.109", "SHA-256"):

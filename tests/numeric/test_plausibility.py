@@ -13,7 +13,9 @@ from campaign import campaign, sampled
 import runtime
 import symgen
 from oracles.random_robots import random_parameters, random_robot
+from runtime.estimators.methods import estimate_of
 from runtime.estimators.semidefinite import LinearBounds, closest, everything
+from runtime.identification.plausibility.excited import UNSEEN, excited, unexcited_shares
 from runtime.identification.plausibility.fits import Barrier, Grams, least_squares, physical_fit
 from runtime.identification.plausibility.samples import samples_of
 from runtime.model.inertia import physical_model
@@ -138,6 +140,22 @@ def random_record(seed: int) -> tuple[object, object, runtime.Record]:
 
 
 RANDOM = [seed for seed in range(900_000, 900_030) if random_robot(seed).elements]
+
+
+def test_parameters_that_the_motion_cannot_tell_are_named_before_the_fit() -> None:
+    """One joint moves a thousandth of what it did: what is named has a deviation far above that of the others in the fit too."""
+    _, model, right = random_record(RANDOM[0])
+    assert excited(model, [right], Study()).state == "good"
+    q = right.q.copy()
+    q[:, 0] = q[0, 0] + 1e-3 * (q[:, 0] - q[0, 0])
+    record = runtime.Record(right.t, q, right.tau)
+    shares = unexcited_shares(model, [record], Study())
+    check = excited(model, [record], Study())
+    assert check.state == "doubtful" and max(shares, key=shares.__getitem__) in check.finding
+    unseen = {name for name, share in shares.items() if share > UNSEEN}
+    fit = estimate_of(runtime.observe(model, record), model=model)
+    deviation = dict(zip(fit.names, 100 * fit.sigma / np.abs(fit.X), strict=True))
+    assert np.median([deviation[name] for name in unseen]) > 3 * np.median([deviation[name] for name in shares.keys() - unseen])
 
 
 @pytest.mark.parametrize("seed", sampled(RANDOM, 2))

@@ -128,7 +128,7 @@ def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
     assert checklist.state == state
     assert checklist.answer == {"good": "Yes, as far as judged", "doubtful": "With care", "no": "No"}[state]
     if question is None:
-        assert checklist.worst is None and "not judged" in checklist.doubt
+        assert checklist.worst is None and "Not judged" in checklist.doubt
     else:
         assert (
             question in checklist.worst.question and checklist.worst.finding in checklist.doubt and checklist.worst.remedy in checklist.next

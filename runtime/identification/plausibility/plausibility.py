@@ -19,6 +19,7 @@ from runtime.identification.checklist import WORST, Check, State
 from runtime.identification.plausibility.before import REST, before_checks, times
 from runtime.identification.plausibility.continuous import searched
 from runtime.identification.plausibility.delay import CERTAIN, LONGEST, Delay, delay
+from runtime.identification.plausibility.excited import excited
 from runtime.identification.plausibility.gravity import Gravity, gravity_direction
 from runtime.identification.plausibility.known import KnownValues, known_values
 from runtime.identification.plausibility.samples import STANDING, Samples, samples_of
@@ -152,7 +153,8 @@ def plausibility(
         physical = physical_model(model)
     except InputError:
         physical = None
-    checks += [*before_checks(model, samples, physical), rest(model, whole, study, samples)]
+    motion = excited(model, whole, study)
+    checks += [*before_checks(model, samples, physical), rest(model, whole, study, samples), *([] if motion is None else [motion])]
     rows = samples.moving().sum(axis=0)
     enough = int(rows.sum()) > ROWS * len(model.BASE_PARAMETERS) and int(rows.min()) > FEWEST
     if physical is None or not enough:

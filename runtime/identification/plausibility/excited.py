@@ -1,0 +1,67 @@
+"""Which parameters the motion of a record cannot tell, from W alone, before anything is fitted.
+
+    share_i = 100 sigma_i ||W_w,i|| / ||Y_w||       rows of W_w, Y_w divided by the deviation of their torque, sigma_i as `runtime.excitation` predicts it
+
+is the predicted deviation of parameter i in % of the value with which it alone would make all of the measured torque. A larger value is not to be expected, so
+its %sigma is hardly below share_i. The torque noise is taken as NOISE of the torque of the joint, white: a convention, since the noise is not known before the fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.excitation.criteria import Weights, kept_correlation
+from runtime.identification.checklist import DEVIATION, NAMED, Check
+from runtime.model.generated import GeneratedModel
+from runtime.observation.observation import observe
+from runtime.records.record import Record
+from runtime.settings.study import Study
+
+NOISE = 0.05
+"""Deviation of the torque noise, of the rms of the torque of a joint."""
+SINGULAR = 1e10
+"""Condition number of W_w with columns of one length, from which it has no full rank."""
+UNSEEN = 100.0
+"""Share, %, above which nothing is told of a parameter, however large it is."""
+
+
+def excited(model: GeneratedModel, records: Sequence[Record], study: Study) -> Check | None:
+    """Parameters that the motion cannot tell; None where no row is used, or W has no full rank, which the fit itself says by name."""
+    try:
+        shares = unexcited_shares(model, records, study)
+    except (InputError, np.linalg.LinAlgError):
+        return None
+    question, limit = (
+        "Does the motion excite every parameter?",
+        f"predicted deviation below {UNSEEN:g} % of the largest possible value, with {100 * NOISE:g} % of torque noise",
+    )
+    order = sorted(shares, key=lambda name: -shares[name])
+    unseen = [name for name in order if shares[name] > UNSEEN]
+    if not unseen:
+        weak = [name for name in order if shares[name] > DEVIATION]
+        text = f"Least excited is {order[0]}, {shares[order[0]]:.2g} %" + (
+            f"; above {DEVIATION:g} %: {', '.join(weak[:NAMED])}" if weak else ""
+        )
+        return Check(question, "good", text, limit)
+    named = ", ".join(unseen[:NAMED]) + (f" and {len(unseen) - NAMED} more" if len(unseen) > NAMED else "")
+    remedy = "move the joints behind these parameters more, further or faster (symgen excite finds a motion), or leave them out (estimate.columns)"
+    return Check(question, "doubtful", f"It cannot tell {named}, whatever their values", limit, remedy)
+
+
+def unexcited_shares(model: GeneratedModel, records: Sequence[Record], study: Study) -> dict[str, float]:
+    """share_i, %, by name of the parameter; LinAlgError where W has no full rank."""
+    observation = observe(model, records, study)
+    s = np.array([NOISE * float(np.sqrt(np.mean(observation.Y[observation.joint(j)] ** 2))) for j in range(observation.n)])
+    if not s.all():
+        raise InputError("torques that are zero throughout")
+    columns = np.linalg.norm(observation.W / s[observation.joints][:, None], axis=0)
+    if not columns.all():
+        raise np.linalg.LinAlgError("a column is zero")
+    weights = Weights(observation.names, s, float(np.linalg.norm(observation.Y / s[observation.joints])) / columns)
+    if weights.condition(observation) > SINGULAR:
+        raise np.linalg.LinAlgError("no full rank")
+    sigma = weights.relative_sigma(observation, kept_correlation(study.signals, records[0].rate))
+    return dict(zip(observation.names, map(float, sigma), strict=True))
