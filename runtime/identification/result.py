@@ -177,7 +177,7 @@ class Identification:
         known = [f"{record.name}: {text}." for record in self.records if (text := getattr(record, "known", ""))]
         whole = [record for record in self.records if isinstance(record, Record)]
         encoders = [text for record in whole for text in encoder_sentences(self.model, record, self.study.signals)]
-        return (*(f"Time stamps of {name}: {text}." for name, text in texts), *known, *encoders)
+        return (*(f"Time stamps of {name}: {text}." for name, text in texts), *known, *self.observation.findings, *encoders)
 
     @property
     def prediction_error(self) -> float:

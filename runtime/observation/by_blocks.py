@@ -19,7 +19,7 @@ from runtime.observation.counts_by_blocks import CountStage
 from runtime.observation.filters import SpeedErrors, States, decimation_factor, decimation_plan, kept_samples
 from runtime.observation.regressor_signals import DistinctSignals, Entries
 from runtime.observation.rows import nothing_left, per_joint
-from runtime.observation.states import certain_rows, encoder_drives, encoder_position, encoder_root
+from runtime.observation.states import certain_rows, encoder_drives, encoder_position, encoder_root, sentences
 from runtime.observation.streaming_filters import (
     Chain,
     Stage,
@@ -57,6 +57,8 @@ class Layout:
         Time of the first and of the last row.
     dropped : mapping of str to tuple of int
         Rows left out, per joint, by reason.
+    findings : tuple of str
+        What the reader of counts says of the encoders.
     """
 
     start: int
@@ -69,6 +71,7 @@ class Layout:
     t0: float
     t1: float
     dropped: Mapping[str, tuple[int, ...]]
+    findings: tuple[str, ...] = ()
 
 
 def layout(model: GeneratedModel, stream: Stream, study: Study, constants: Mapping[str, float]) -> Layout:
@@ -86,7 +89,8 @@ def layout(model: GeneratedModel, stream: Stream, study: Study, constants: Mappi
         )
     at = Layout(start, stop, factor, int(instants[0]), K, (), (), np.inf, -np.inf, {})
     counts, fast, shown, k = np.zeros(n, dtype=int), np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
-    for t, mask, certain in _instants(model, stream, study, at, constants):
+    counted = CountStage(len(stream), stream.rate, signals, stream.name) if signals.reader == "counts" else None
+    for t, mask, certain in _instants(model, stream, study, at, constants, counted):
         fast += mask.sum(axis=1)
         mask = mask & certain
         counts += mask.sum(axis=1)
@@ -100,17 +104,18 @@ def layout(model: GeneratedModel, stream: Stream, study: Study, constants: Mappi
         dropped["direction"] = tuple((fast - counts).tolist())
     if not counts.any():
         raise InputError(nothing_left(dropped, K), file=stream.name)
-    return replace(at, rows=tuple(counts.tolist()), shown=tuple(shown.tolist()), dropped=dropped)
+    findings = sentences(counted.findings, stream.name) if counted else ()
+    return replace(at, rows=tuple(counts.tolist()), shown=tuple(shown.tolist()), dropped=dropped, findings=findings)
 
 
 def _instants(
-    model: GeneratedModel, stream: Stream, study: Study, at: Layout, constants: Mapping[str, float]
+    model: GeneratedModel, stream: Stream, study: Study, at: Layout, constants: Mapping[str, float], counts: CountStage | None
 ) -> Iterator[tuple[Array, Array, Array]]:
     """Time (k,) of the kept instants, rows used but for their direction, and rows of known direction, bool (n, k), by blocks."""
     speeds = per_joint(study.rows.low_speed, stream.n, "rows.low_speed")
     k = 0
-    if speeds.any() or study.signals.reader == "counts":
-        timed = ((t, qd, s) for t, _, qd, _, s, _ in filtered_blocks(model, stream, study.signals))
+    if speeds.any() or counts is not None:
+        timed = ((t, qd, s) for t, _, qd, _, s, _ in filtered_blocks(model, stream, study.signals, counts))
     else:
         timed = ((t, np.empty((len(t), stream.n)), np.empty((len(t), 0))) for t in stream.times())
     for begin, (t, qd, s) in _windowed(timed, at):
@@ -154,15 +159,17 @@ def observed_blocks(
     yield from ready(whole.finish(), torques.finish())
 
 
-def filtered_blocks(model: GeneratedModel, stream: Stream, signals: Signals) -> Iterator[tuple[Array, Array, Array, Array, Array, Array]]:
+def filtered_blocks(
+    model: GeneratedModel, stream: Stream, signals: Signals, counts: CountStage | None = None
+) -> Iterator[tuple[Array, Array, Array, Array, Array, Array]]:
     """t (B,), q, qd, qdd, deviations of the velocities at the encoders and torques (B, n), by blocks of their own lengths.
 
     Positions and torques have passed the median and low-pass filters, or the reader of counts in place of the median; without it there are no
     deviations, (B, 0).
     """
-    counts, drives = None, None
+    drives = None
     if signals.reader == "counts":
-        counts, drives = CountStage(len(stream), stream.rate, signals, stream.name), encoder_drives(model, signals)
+        counts, drives = counts or CountStage(len(stream), stream.rate, signals, stream.name), encoder_drives(model, signals)
     position, velocity = (
         position_stage(stream.rate, replace(signals, median=1) if counts else signals),
         velocity_stage(stream.rate, signals),

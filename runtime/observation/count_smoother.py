@@ -40,7 +40,7 @@ CHANGE = 0.02
 """Relative change of the precisions at which passes end."""
 LINES = 0.01
 """Error of a line that is always allowed for, steps."""
-WINDOW, OF_RECORD = 0.5, 10.0
+WINDOW, OF_RECORD = 0.05, 3.0
 """Length of time that has a jerk density of its own, s, and the weight of the whole record in it, in determined jerks."""
 RANGE, CONDITION = 1e-3, 1e-9
 """Least share of a window's density in that of the record; least density that a Cholesky factor resolves, by h^5."""

@@ -87,6 +87,11 @@ class Part:
     stop: int
     moving: Array
 
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """Sentences about the lines of its encoders."""
+        return tuple(f"encoder {j + 1}: {each.finding}" for j, each in zip(self.moving, self.smoothed.errors, strict=True) if each.finding)
+
 
 def read_counts(
     position: Array,
@@ -141,8 +146,7 @@ def _reading(counts: Array, rate: float, known: Lattice, lines: Lines, said: Seq
             part = replace(part, begin=begin, first=first, stop=stop)
             density[part.moving] += part.smoothed.density.mean(axis=1) * (stop - first) / N
             parts.append(part)
-            uneven = [(j, each.finding) for j, each in zip(part.moving, part.smoothed.errors, strict=True) if each.finding]
-            found.update({f"encoder {j + 1}: {text}": None for j, text in uneven})
+            found.update(dict.fromkeys(part.findings))
     for i, x in enumerate(states):
         x *= known.step
         if i == 0:

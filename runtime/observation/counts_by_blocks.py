@@ -16,7 +16,7 @@ Array = np.ndarray
 class CountStage:
     """Positions at the encoders, shape (B, n), go in by pieces; positions read and deviations of velocities come out.
 
-    Step, phase and findings are those of the first stretch.
+    Step and phase are those of the first stretch. findings : what the stretches say, as in `runtime.observation.counts`.
 
     Parameters
     ----------
@@ -33,6 +33,7 @@ class CountStage:
         self.left = stretches(samples)
         self.held, self.begin = Queue(), 0  # samples from `begin` of the record on
         self.lattice: Lattice | None = None
+        self.findings: dict[str, None] = {}
 
     def push(self, position: Array) -> tuple[Array, Array]:
         """q and s_qd, shape (k, n), of the stretches that are complete."""
@@ -43,11 +44,14 @@ class CountStage:
             begin, first, stop, end = self.left.pop(0)
             x = self.held.take(self.held.count)
             own = x[: end - begin]
-            self.lattice = self.lattice or lattice(own, self.step, name=self.name)
+            if self.lattice is None:
+                self.lattice = lattice(own, self.step, name=self.name)
+                self.findings.update(dict.fromkeys(self.lattice.findings))
             counts, said = unwrapped(self.lattice.counts(own), name=self.name)
             if said:
                 raise SettingsError(f"{said[0]}; such a record is read as a whole, set stream: off", path=("signals", "reader"))
-            _, states = read_stretch(counts, self.rate, self.lines)
+            part, states = read_stretch(counts, self.rate, self.lines)
+            self.findings.update(dict.fromkeys(part.findings if part else ()))
             kept = slice(first - begin, stop - begin)
             q.append(self.lattice.position(states[0][kept]))
             s.append(states[4][kept] * self.lattice.step)

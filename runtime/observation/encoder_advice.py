@@ -1,4 +1,4 @@
-"""What a record shows of its encoders: whether reading counts would help, or what the reader of counts met. Sentences for identify and report.
+"""Whether reading counts would help a record whose positions are taken as they are: one sentence for identify and report.
 
 Positions taken as they are carry an error of variance step^2/12. Through the filters of the study it becomes an error of qdd of variance v; the
 columns of W are attenuated by about v over the mean square of qdd. Above HELPS that is a bias worth another reader.
@@ -16,7 +16,7 @@ from runtime.model.generated import GeneratedModel, drives_of
 from runtime.observation.encoder_lattice import Lattice, lattice
 from runtime.observation.filters import filtered_states
 from runtime.observation.noise_gain import bandwidth
-from runtime.observation.states import encoder_drives, encoder_position, encoder_root
+from runtime.observation.states import encoder_position, encoder_root
 from runtime.records.record import Record
 from runtime.settings.study import Signals
 
@@ -29,13 +29,10 @@ LOOKED_AT = 2**16
 
 
 def encoder_sentences(model: GeneratedModel, record: Record, signals: Signals) -> tuple[str, ...]:
-    """Findings of the reader of counts; or, positions being taken as they are, one sentence where reading counts would help."""
-    q = record.q[:LOOKED_AT]
+    """Positions being taken as they are, one sentence where reading counts would help."""
     if signals.reader == "counts":
-        return tuple(
-            f"{record.name}: {text}." for text in lattice(encoder_position(q, encoder_drives(model, signals)), signals.step).findings
-        )
-    advice = _advice(model, q, record.rate, signals)
+        return ()
+    advice = _advice(model, record.q[:LOOKED_AT], record.rate, signals)
     return (f"{record.name}: {advice}",) if advice else ()
 
 

@@ -45,16 +45,18 @@ class SpeedErrors:
 class States:
     """Joint positions, velocities and accelerations, each of shape (N, n), rad or m, per s, per s^2.
 
-    errors : what is known of errors of the velocities; None: they count as exact.
+    errors : what is known of errors of the velocities; None: they count as exact.   findings : what the reader says of the encoders.
     """
 
     q: Array
     qd: Array
     qdd: Array
     errors: SpeedErrors | None = None
+    findings: tuple[str, ...] = ()
 
     def __getitem__(self, samples: slice | Array) -> States:
-        return States(self.q[samples], self.qd[samples], self.qdd[samples], None if self.errors is None else self.errors[samples])
+        errors = None if self.errors is None else self.errors[samples]
+        return States(self.q[samples], self.qd[samples], self.qdd[samples], errors, self.findings)
 
     def __len__(self) -> int:
         return len(self.q)

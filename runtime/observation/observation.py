@@ -169,6 +169,7 @@ def observation_from_states(
         dropped=dropped,
         settings=_settings(selection.signals, selection.rows, selection.factor),
         files=dict(files or {}),
+        findings=states.findings,
     )
 
 
@@ -216,6 +217,7 @@ def _observed_by_blocks(
         dropped={reason: tuple(np.sum([at.dropped[reason] for at in layouts], axis=0).tolist()) for reason in layouts[0].dropped},
         settings={**settings, "stream": {"block": max(stream.block for stream in streams)}},
         files=all_files([stream.files for stream in streams]),
+        findings=tuple(dict.fromkeys(text for at in layouts for text in at.findings)),
     )
     if held:
         return observation

@@ -7,7 +7,7 @@ counts     positions as counts of encoders (`runtime.observation.counts`), whose
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -22,8 +22,8 @@ from runtime.settings.study import Signals
 
 Array = np.ndarray
 
-UNCERTAIN = 1.0
-"""Deviations of a speed below which its sign is not used; chosen on simulated records (docs/theory/counts.md)."""
+UNCERTAIN = 0.5
+"""Deviations of a speed below which its sign is not used: wrong in 31 % of the cases or more. Chosen on simulated records (docs/theory/counts.md)."""
 
 
 def observed_states(
@@ -49,7 +49,13 @@ def observed_states(
     if signals.reader == "lowpass":
         return filtered_states(q, rate, signals)
     drives = encoder_drives(model, signals, drives)
-    return joint_states(read_counts(encoder_position(q, drives), rate, signals.step, lines=signals.lines, name=name), rate, signals, drives)
+    reading = read_counts(encoder_position(q, drives), rate, signals.step, lines=signals.lines, name=name)
+    return replace(joint_states(reading, rate, signals, drives), findings=sentences(reading.findings, name))
+
+
+def sentences(findings: Iterable[str], name: str) -> tuple[str, ...]:
+    """Findings of one record as sentences that name it."""
+    return tuple(f"{name}: {text}." for text in findings)
 
 
 def joint_states(reading: Reading, rate: float, signals: Signals, drives: Drives | None) -> States:

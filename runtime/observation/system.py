@@ -91,6 +91,8 @@ class Observation:
         What can simulate the same rows with other parameters, where it is known.
     reduced : Reduced or None
         Triangular factors in place of the rows.
+    findings : tuple of str
+        What the reader of counts says of the encoders, a sentence each.
     """
 
     W: Array
@@ -106,6 +108,7 @@ class Observation:
     errors: Array | None = None
     closed_loop: LoopRows | None = None
     reduced: Reduced | None = None
+    findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         r = 0 if self.reduced else sum(self.rows)
@@ -306,6 +309,7 @@ def stack(observations: Sequence[Observation]) -> Observation:
         settings=same_settings([o.settings for o in observations]),
         files=all_files([o.files for o in observations]),
         errors=_mean_errors(observations),
+        findings=tuple(dict.fromkeys(text for o in observations for text in o.findings)),
     )
 
 
