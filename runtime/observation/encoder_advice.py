@@ -49,10 +49,15 @@ def _advice(model: GeneratedModel, q: Array, rate: float, signals: Signals) -> s
             if share.max() < HELPS:
                 return ""
             return (
-                f"positions change in steps of {found.step.min():.3g} to {found.step.max():.3g} ({side} side), which make {100 * share.max():.0f} % of the "
+                f"positions change in steps of {_range(found.step)} ({side} side), which make {100 * share.max():.0f} % of the "
                 f"mean square of an acceleration; signals: {{reader: counts, side: {side}}} reads them as counts."
             )
     return ""
+
+
+def _range(steps: Array) -> str:
+    least, most = f"{steps.min():.3g}", f"{steps.max():.3g}"
+    return least if least == most else f"{least} to {most}"
 
 
 def _attenuation(q: Array, rate: float, signals: Signals, found: Lattice, drives: Drives | None) -> Array:

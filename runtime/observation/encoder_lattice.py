@@ -20,6 +20,10 @@ OFF = 0.1
 WRAPS = (2**16, 2**32)
 FAST = 20
 """Median change of the count from sample to sample, where it changes, above which a record tells of positions alone."""
+FEW = 50
+"""Changes of a count below which little is known of its motion."""
+UNEQUAL = 1.01
+"""Ratio of the steps of two encoders above which they are not the same kind."""
 JUMP = 30
 """A change of the count this many times its neighbours is none of a motion."""
 SHAKEN = 0.01
@@ -76,11 +80,7 @@ def lattice(
         shares[j] = shaken_share(counts)
         off = _distance(x, steps[j], phases[j])
         if off > OFF:
-            raise InputError(
-                f"{label}: positions lie {off:.2g} steps (rms) off the lattice of step {steps[j]:.6g}; they were filtered, interpolated or "
-                "converted by a driver, or the step is another: correct signals.step, record the counts, or use reader: lowpass",
-                file=name,
-            )
+            raise InputError(f"{label}: {_off(x, off, steps[j], step is None)}", file=name)
         if off > OFF / 5:
             findings.append(
                 f"{label}: positions lie {off:.2g} steps (rms) off the lattice of step {steps[j]:.6g}, as if rounded to few digits"
@@ -92,7 +92,9 @@ def lattice(
             "do not trust those of velocities and accelerations"
         )
     if step is None:
-        findings.insert(0, f"steps from the record: {', '.join(f'{x:.6g}' for x in steps)}")
+        unequal = steps.max() > UNEQUAL * steps.min() and len({text for text in findings if "never changes" in text}) < n - 1
+        text = f"steps from the record: {', '.join(f'{x:.6g}' for x in steps)}"
+        findings.insert(0, f"{text}; the encoders differ, compare with their data sheets" if unequal else text)
     return Lattice(steps, phases, tuple(findings))
 
 
@@ -142,8 +144,8 @@ def unwrapped(counts: Array, *, name: str = "record") -> tuple[Array, tuple[str,
         wrap = next((w for w in WRAPS if (np.abs(np.abs(change[jumps]) - w) <= 2 * (near[jumps] + 2)).all()), None)
         if wrap is None:
             raise InputError(
-                f"encoder {j + 1}: the count jumps by {change[jumps[0]]:.0f} at sample {known[jumps[0] + 1]}, {len(jumps)} times in all; "
-                "it was reset or lost there, cut the record at these samples",
+                f"encoder {j + 1}: the count jumps by {change[jumps[0]]:.0f} at sample {known[jumps[0] + 1]}"
+                f"{f', {len(jumps)} times in all' if len(jumps) > 1 else ''}; it was reset or lost there, cut the record at such samples",
                 file=name,
             )
         turns = np.zeros(len(k))
@@ -187,8 +189,27 @@ def _distance(x: Array, step: float, phase: float) -> float:
     return float(np.sqrt(np.mean((cell - np.round(cell)) ** 2)))
 
 
+def _off(x: Array, off: float, step: float, own: bool) -> str:
+    """What is wrong with positions that are `off` steps (rms) off their lattice, and what to do."""
+    text = f"positions lie {off:.2g} steps (rms) off the lattice of step {step:.6g}"
+    suggested = 0.0 if own else smallest_step(x)
+    if suggested and _distance(x, suggested, _phase(x, suggested)) < OFF / 5:
+        part, remedy = step / suggested, f"set signals.step to {suggested:.6g}, encoder by encoder"
+        if part > 1.5 and abs(part - round(part)) < 0.01:
+            return f"{text} and on one {round(part)} times finer: {remedy}, or, if a driver averaged so many samples, record the counts"
+        return f"{text} and on one of step {suggested:.6g}: {remedy}"
+    return (
+        f"{text}; they were filtered, interpolated or converted by a driver or by record.resample, or the step is another: correct signals.step, "
+        "record the counts, or use reader: lowpass"
+    )
+
+
 def _speed(change: Array, label: str) -> list[str]:
     moving = np.abs(change[change != 0])
+    if 0 < len(moving) < FEW:
+        return [
+            f"{label}: the count changes {len(moving)} times only; the motion is known at these instants alone, move further or use a finer encoder"
+        ]
     if len(moving) and (fast := float(np.median(moving))) > FAST:
-        return [f"{label}: the count changes by {fast:.0f} a sample; no edge is seen, counts tell as much as positions here"]
+        return [f"{label}: the count changes by {fast:.0f} a sample; no edge is seen, counts tell as much as positions here, log faster"]
     return []

@@ -65,15 +65,17 @@ def joint_states(reading: Reading, rate: float, signals: Signals, drives: Drives
     return replace(states, errors=SpeedErrors(reading.s_qd, encoder_root(drives, q.shape[1])))
 
 
-def certain_rows(model: GeneratedModel, states: States, constants: Mapping[str, float] | None = None) -> Array:
+def certain_rows(
+    model: GeneratedModel, states: States, constants: Mapping[str, float] | None = None, *, deviations: float = UNCERTAIN
+) -> Array:
     """Rows of every joint in which each direction of dry friction is known, bool, shape (n, K), of states (K, n) with known errors.
 
-    A row of joint j is uncertain where |s| is below UNCERTAIN deviations of s, s = G qd the speed of a column that switches and acts on j.
+    A row of joint j is uncertain where |s| is below `deviations` of s, s = G qd the speed of a column that switches and acts on j.
     """
     certain = np.ones(states.q.T.shape, dtype=bool)
     if states.errors is not None:
         for switch in switches(model, model.BASE_PARAMETERS, constants, passive="left out"):
-            certain[list(switch.joints)] &= np.abs(states.qd @ switch.G) >= UNCERTAIN * states.errors.along(switch.G)
+            certain[list(switch.joints)] &= np.abs(states.qd @ switch.G) >= deviations * states.errors.along(switch.G)
     return certain
 
 

@@ -8,6 +8,7 @@ from campaign import campaign
 from planar_data import motion
 from scipy.stats import truncnorm
 
+import runtime
 import symgen
 from runtime import load_model
 from runtime.errors import InputError, SettingsError
@@ -166,7 +167,8 @@ def test_a_step_that_is_a_fraction_of_the_true_one_is_told():
     ("change", "step", "words"),
     [
         (lambda q: q + 0.003 * np.sin(40 * T)[:, None], 0.01, "off the lattice"),
-        (lambda q: q, 0.013, "off the lattice"),
+        (lambda q: q, 0.013, "set signals.step to 0.01, encoder"),
+        (lambda q: (q[2:] + q[1:-1] + q[:-2]) / 3, 0.01, "3 times finer: .* or, if a driver averaged"),
         (lambda q: q, 0.0, "expected a positive number"),
         (lambda q: q, 40.0, "larger than its motion"),
         (lambda q: 0 * q, None, "no position changes"),
@@ -243,9 +245,18 @@ def test_rows_of_uncertain_direction_are_left_out(planar, record):
 
 def test_by_blocks_as_a_whole(planar, record, monkeypatch):
     monkeypatch.setattr("runtime.observation.counts.STRETCH", 3000)
-    whole, blocks = observe(planar, record, STUDY), observe(planar, RecordStream(record, 700), STUDY)
+    study = replace(STUDY, signals=replace(STUDY.signals, step=2.5e-3))
+    whole, blocks = observe(planar, record, study), observe(planar, RecordStream(record, 700), study)
     assert whole.rows == blocks.rows and whole.dropped == blocks.dropped
+    assert whole.findings == blocks.findings and "multiples of 2; the step of the record is 0.005" in whole.findings[0]
     np.testing.assert_allclose(blocks.W, whole.W, atol=1e-6 * np.abs(whole.W).max())
+
+
+def test_identify_prints_what_the_reader_says_of_the_encoders(planar, record):
+    noise = 0.02 * np.random.default_rng(0).standard_normal(record.tau[:4000].shape)
+    half = Record(record.t[:4000], record.q[:4000], record.tau[:4000] + noise, rate=1000.0)
+    result = runtime.identify(planar, half, replace(STUDY, signals=replace(STUDY.signals, step=2.5e-3)))
+    assert "record: encoder 2: counts change by multiples of 2; the step of the record is 0.005, not 0.0025." in result.to_text()
 
 
 def test_stretches_cover_the_record_once():
