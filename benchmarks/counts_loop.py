@@ -1,9 +1,10 @@
 """Positions read as counts where the encoder also drives the controller: simulated records of known truth, bias and scatter beside other estimators.
 
-    python benchmarks/counts_loop.py [--records 12] [--robots tx40 emps]
+    python benchmarks/counts_loop.py [--records 66] [--simulating 6] [--robots tx40 emps]
 
 Records, loops and other estimators are those of `benchmarks/estimators.py`. OLS and WLS read as counts know neither controller nor reference. IV and
-DIDIM start from WLS read as counts; IV also takes W from the reader. Estimates are kept in counts_loop_runs.jsonl; the same command goes on from there.
+DIDIM start from WLS read as counts; "counts iv" and "counts didim" also take W, or the rows, from the reader, "didim from counts" starts there and does the
+rest by the low-pass. Estimates are kept in counts_loop_runs.jsonl; the same command goes on from there.
 """
 
 # ruff: noqa: E402
@@ -14,6 +15,7 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,59 +23,81 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"  # before numpy
 
 import numpy as np
-from estimators import AROUND, Key, bench, determined, made, with_encoder
+from estimators import AROUND, bench, determined, with_encoder
 
 from runtime import InputError
-from runtime.estimators.closed_loop import closed_loop
+from runtime.estimators.closed_loop import ClosedLoop, closed_loop
 from runtime.estimators.methods import estimate_of
 from runtime.observation.counts import read_counts
-from runtime.settings.study import EstimateSettings
+from runtime.observation.filters import lowpass_filtered
+from runtime.observation.observation import Observation, decimated_torque
+from runtime.records.record import Record
+from runtime.settings.study import EstimateSettings, Lowpass, Study
 from runtime.table import aligned
 
 Array = np.ndarray
 STEPS = {"tx40": [2 * np.pi / k for k in (4000, 2000, 1000, 500)], "emps": [2e-5, 5e-5, 1e-4]}
 LOW, COUNTS = ("ols", "wls", "iv", "didim"), ("counts ols", "counts wls", "counts iv", "counts didim")
+STARTED = "didim from counts"
+BAND = {"tx40": 50.0, "emps": 100.0}  # Hz
 
 
-def estimates(robot: str, step: float, seed: int, methods: Sequence[str]) -> list[dict[str, Any]]:
-    """Estimates of one record by every method, and the calibration of the reader."""
+def estimates(robot: str, step: float, seed: int, simulating: bool) -> list[dict[str, Any]]:
+    """Estimates of one record by every method, and the calibration of the reader. simulating : iv and didim too, which simulate the loop."""
     b = bench(robot)
-    record, loop = made(Key(robot, step, seed, ()))
+    run = with_encoder(robot, step).run(b.truth, b.reference, seed=seed)
+    record = replace(run.record(), q_r=b.reference.q)
     study = replace(b.study, signals=replace(b.study.signals, reader="counts", step=step))
-    by_counts = closed_loop(b.model, [replace(record, q_r=b.reference.q)], study, b.simulator, around=AROUND[robot])
-    observations = {"low": loop.measured(), "counts": by_counts.measured()}
+    observations = {reader: observed(robot, record, own) for reader, own in (("", b.study), ("counts", study))}
+    key = {"robot": robot, "step": step, "seed": seed}
     rows, start = [], {}
-    for method in ("ols", "wls", "counts ols", "counts wls", "iv", "didim", "counts iv", "counts didim"):
-        reader, _, kind = method.rpartition(" ")
-        if kind not in methods:
-            continue
-        options = {"start": start, "gains": "one"} if kind in ("iv", "didim") else {}
-        row = {"robot": robot, "step": step, "seed": seed, "method": method}
+    for method in (*LOW[:2], *COUNTS[:2], *((*LOW[2:], *COUNTS[2:], STARTED) if simulating else ())):
+        reader, _, kind = method.removesuffix(" from counts").rpartition(" ")
+        row = {**key, "method": method}
         try:
-            if kind in ("iv", "didim") and not reader:  # 15 % off, as in benchmarks/estimators.py
-                signs = np.random.default_rng([seed, 1]).uniform(-1, 1, len(b.truth))
-                options["start"] = dict(zip(b.model.BASE_PARAMETERS, (b.truth * (1 + 0.15 * signs)).tolist(), strict=True))
-            e = estimate_of(observations[reader or "low"], EstimateSettings(kind, options=options), model=b.model)
+            options: dict[str, Any] = {}
+            if kind in ("iv", "didim"):
+                signs = np.random.default_rng([seed, 1]).uniform(-1, 1, len(b.truth))  # 15 % off, as in benchmarks/estimators.py
+                away = dict(zip(b.model.BASE_PARAMETERS, (b.truth * (1 + 0.15 * signs)).tolist(), strict=True))
+                options = {"start": start if "counts" in method else away, "gains": "one"}
+            e = estimate_of(observations[reader], EstimateSettings(kind, options=options), model=b.model)
             row |= {"X": e.X.tolist(), "corrected": e.sigma_corrected.tolist(), "status": e.status}
             if method == "counts wls":
                 start = dict(zip(e.names, e.X.tolist(), strict=True))
         except InputError as error:
             row |= {"status": str(error)}
         rows.append(row)
-    rows.append({"robot": robot, "step": step, "seed": seed, "method": "calibration", "status": "ok", "X": calibration(robot, step, seed)})
-    return rows
+    return [*rows, {**key, "method": "calibration", "status": "ok", "X": calibration(robot, run, step)}]
 
 
-def calibration(robot: str, step: float, seed: int) -> list[float]:
-    """rms of the errors of q, qd, qdd over their stated deviations, where the arm moves faster than the rows of the study need."""
+@cache
+def first_loop(robot: str) -> ClosedLoop:
+    """The loop of a record with an exact encoder: rows are chosen by the reference, so those of every record are the same."""
     b = bench(robot)
-    run = with_encoder(robot, step).run(b.truth, b.reference, seed=seed)
+    record = with_encoder(robot, 0.0).run(b.truth, b.reference, seed=0).record()
+    return closed_loop(b.model, [replace(record, q_r=b.reference.q)], b.study, b.simulator, around=AROUND[robot])
+
+
+def observed(robot: str, record: Record, study: Study) -> Observation:
+    """Rows of one record with its loop, through the filters of a study."""
+    loop = first_loop(robot)
+    selection = replace(loop.parts[0].selection, signals=study.signals)
+    part = replace(loop.parts[0], record=record, selection=selection, torque=decimated_torque(record.tau, selection))
+    return replace(loop, study=study, parts=(part,), law=()).measured()
+
+
+def calibration(robot: str, run: Any, step: float) -> list[float]:
+    """rms of the errors of q, qd, qdd over their stated deviations, then of the errors below BAND, where the arm is faster than the rows of the study need."""
+    study = bench(robot).study
     reading = read_counts(run.record().q, run.rate, step)
-    slowest = float(np.max(b.study.rows.low_speed))
-    moving = np.abs(run.qd[: len(reading.qd)]) > slowest
-    offset = np.median(reading.q - run.q[: len(reading.q)], axis=0)  # floor against round cannot be told
-    pairs = ((reading.q - offset, reading.s_q, run.q), (reading.qd, reading.s_qd, run.qd), (reading.qdd, reading.s_qdd, run.qdd))
-    return [float(np.sqrt(np.mean((((x - truth[: len(x)]) / s)[moving]) ** 2))) for x, s, truth in pairs]
+    N = len(reading.q)
+    moving = np.abs(run.qd[:N]) > float(np.max(study.rows.low_speed))
+    errors = [reading.q - run.q[:N], reading.qd - run.qd[:N], reading.qdd - run.qdd[:N]]
+    errors[0] = errors[0] - np.median(errors[0], axis=0)  # floor against round cannot be told
+    low = Lowpass(cutoff=BAND[robot])
+    slow = [lowpass_filtered(e, run.rate, low) for e in errors]
+    stated = (reading.s_q, reading.s_qd, reading.s_qdd)
+    return [float(np.sqrt(np.mean(((e / s)[moving]) ** 2))) for part in (errors, slow) for e, s in zip(part, stated, strict=True)]
 
 
 def table(rows: Sequence[dict[str, Any]], robot: str) -> str:
@@ -84,14 +108,25 @@ def table(rows: Sequence[dict[str, Any]], robot: str) -> str:
         ("step", "method", "records", "not ok", "rms bias %", "largest", "rms scatter %", "scatter/corrected", "rms error %")
     ]
     for step in STEPS[robot]:
-        for method in (*LOW, *COUNTS, "calibration"):
+        for method in (*LOW, *COUNTS, STARTED, "calibration"):
             mine = [r for r in rows if (r["robot"], r["step"], r["method"]) == (robot, step, method)]
             good = [r for r in mine if r["status"] == "ok"]
             if not good:
                 continue
             if method == "calibration":
                 z = np.mean([r["X"] for r in good], axis=0)
-                lines.append((f"{step:.3g}", "error over stated s_q, s_qd, s_qdd", str(len(good)), "", *(f"{x:.2f}" for x in z), "", ""))
+                for label, part in (("", z[:3]), (f" below {BAND[robot]:g} Hz", z[3:])):
+                    lines.append(
+                        (
+                            f"{step:.3g}",
+                            f"error over stated s_q, s_qd, s_qdd{label}",
+                            str(len(good)),
+                            "",
+                            *(f"{x:.2f}" for x in part),
+                            "",
+                            "",
+                        )
+                    )
                 continue
             X = 100 * (np.array([r["X"] for r in good])[:, kept] - truth) / np.abs(truth)
             stated = 100 * np.array([r["corrected"] for r in good])[:, kept].mean(axis=0) / np.abs(truth)
@@ -110,8 +145,8 @@ def table(rows: Sequence[dict[str, Any]], robot: str) -> str:
 def main() -> None:
     """Compute what is missing, print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--records", type=int, default=12)
-    parser.add_argument("--methods", nargs="*", default=["ols", "wls", "iv", "didim"])
+    parser.add_argument("--records", type=int, default=66)
+    parser.add_argument("--simulating", type=int, default=6, help="records on which iv and didim are tried: a minute each")
     parser.add_argument("--robots", nargs="*", default=["tx40", "emps"])
     given = parser.parse_args()
     file = Path("counts_loop_runs.jsonl")
@@ -121,7 +156,7 @@ def main() -> None:
         for robot in given.robots:
             for step in STEPS[robot]:
                 if (robot, step, seed) not in there:
-                    found = estimates(robot, step, seed, given.methods)
+                    found = estimates(robot, step, seed, seed < given.simulating)
                     rows += found
                     with file.open("a") as out:
                         out.writelines(json.dumps(row) + "\n" for row in found)
