@@ -48,14 +48,24 @@ def deletions(blocks: Iterable[Array], X: Array, T: Array, into: Array) -> Array
     changes = []
     for rows in blocks:
         P = rows[:, :-1] @ T
-        share, V = np.linalg.eigh(P.T @ P)
-        others = share < 1 - ALONE
-        directions = into @ V
-        s = V.T @ (P.T @ (rows[:, -1] - rows[:, :-1] @ X))
-        u = directions[:, others] @ (s[others] / (1 - share[others]))
-        u[(np.abs(directions[:, ~others]) > PARTICIPATION * size).any(axis=1)] = np.nan
-        changes.append(u)
+        G, g = P.T @ P, P.T @ (rows[:, -1] - rows[:, :-1] @ X)
+        others = np.eye(len(G)) - G
+        try:
+            np.linalg.cholesky(others - ALONE * np.eye(len(G)))  # exists where no direction is known by this block alone
+            changes.append(into @ np.linalg.solve(others, g))
+        except np.linalg.LinAlgError:
+            changes.append(_without_its_own(G, g, into, size))
     return np.asarray(np.sqrt(1 - 1 / max(len(changes), 1)) * np.array(changes).reshape(-1, len(into)))
+
+
+def _without_its_own(G: Array, g: Array, into: Array, size: Array) -> Array:
+    """into (1 - G)^-1 g on the directions that other blocks know too; nan where one that they do not know takes part."""
+    share, V = np.linalg.eigh(G)
+    others = share < 1 - ALONE
+    directions = into @ V
+    u = directions[:, others] @ ((V.T @ g)[others] / (1 - share[others]))
+    u[(np.abs(directions[:, ~others]) > PARTICIPATION * size).any(axis=1)] = np.nan
+    return np.asarray(u)
 
 
 def drawn_again(blocks: Iterable[Array], estimator: Callable[[Array], Array], runs: int, seed: int) -> Array:

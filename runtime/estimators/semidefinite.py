@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import clarabel
@@ -308,8 +309,15 @@ def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) ->
 
 def triangle(B: Array) -> Array:
     """Columns of the upper triangles of symmetric matrices, shape (k, n, n), entries off the diagonal times sqrt(2): shape (n (n + 1)/2, k)."""
-    j, i = np.tril_indices(B.shape[1])
-    return np.asarray((B[:, i, j] * np.where(i == j, 1.0, np.sqrt(2.0))).T)
+    i, j, factor = _upper(B.shape[1])
+    return np.asarray((B[:, i, j] * factor).T)
+
+
+@lru_cache(maxsize=32)
+def _upper(n: int) -> tuple[Array, Array, Array]:
+    """Row and column of the entries of an upper triangle, column by column, and their factors."""
+    j, i = np.tril_indices(n)
+    return i, j, np.where(i == j, 1.0, np.sqrt(2.0))
 
 
 def trace(z: Array) -> float:

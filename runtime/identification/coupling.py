@@ -1,4 +1,7 @@
-"""What the coupling of the drives explains: the same records as if the drives were coupled in position and torque, in one of them, or in none."""
+"""What the coupling of the drives explains: the same records as if the drives were coupled in position and torque, in one of them, or in none.
+
+W depends on the positions alone: two observations serve all four, of which that of the coupling used exists already.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from runtime.estimators.estimate import Estimate
 from runtime.estimators.methods import CLOSED_LOOP, estimate_of, linear_companion, point_estimate
 from runtime.model.drives import Coupling, Drives
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation
+from runtime.observation.observation import Observation, with_torques
 from runtime.records.record import Record
 from runtime.records.stream import ChangedStream, Stream
 from runtime.settings.study import Study
@@ -23,10 +26,12 @@ Observed: TypeAlias = Callable[[Sequence[Record | Stream]], Observation]
 COUPLINGS: tuple[Coupling, ...] = ("both", "position", "torque", "none")
 
 
-def coupling_fits(model: GeneratedModel, records: Sequence[Record | Stream], study: Study, observed: Observed) -> dict[Coupling, Estimate]:
+def coupling_fits(
+    model: GeneratedModel, records: Sequence[Record | Stream], study: Study, observation: Observation, observed: Observed
+) -> dict[Coupling, Estimate]:
     """Estimates of all parameters by the coupling used; empty unless all records are of the motor side of coupled drives.
 
-    observed : the rows of records that were read with another coupling.
+    observation : that of the records as they are.   observed : the rows of records that were read with another coupling.
     """
     read_with = [settings.coupling for settings in study.record]
     if len(records) != len(study.record):  # a record that was split at gaps, or records from elsewhere
@@ -36,12 +41,29 @@ def coupling_fits(model: GeneratedModel, records: Sequence[Record | Stream], stu
     drives = Drives.from_mapping(model.DRIVES)
     if not (drives.ratio - np.diag(np.diag(drives.ratio))).any():
         return {}
-    method = linear_companion(study.estimate) if study.estimate.method in CLOSED_LOOP else point_estimate(study.estimate)
+    simulated = study.estimate.method in CLOSED_LOOP
+    method = linear_companion(study.estimate) if simulated else point_estimate(study.estimate)
+    rows: dict[bool, Observation] = {}  # by whether positions are coupled
+    used = read_with[0] if len(set(read_with)) == 1 and not simulated else None
+    if used is not None:
+        rows[turned(used)] = observation
     fits: dict[Coupling, Estimate] = {}
     for coupling in COUPLINGS:
         changed = [recoupled(r, drives.decoupled(own), drives.decoupled(coupling)) for r, own in zip(records, read_with, strict=True)]
-        fits[coupling] = estimate_of(observed(changed), method, model=model)
+        whole = [record for record in changed if isinstance(record, Record)]
+        if coupling == used:
+            own_rows = observation
+        elif turned(coupling) in rows and len(whole) == len(changed):
+            own_rows = with_torques(rows[turned(coupling)], whole, study)
+        else:
+            own_rows = rows[turned(coupling)] = observed(changed)
+        fits[coupling] = estimate_of(own_rows, method, model=model)
     return fits
+
+
+def turned(coupling: Coupling) -> bool:
+    """Whether positions are coupled."""
+    return coupling in ("both", "position")
 
 
 @overload

@@ -58,6 +58,7 @@ __all__ = [
     "observed_states",
     "select_rows",
     "stack",
+    "with_torques",
 ]
 
 
@@ -171,6 +172,16 @@ def observation_from_states(
         files=dict(files or {}),
         findings=states.findings,
     )
+
+
+def with_torques(observation: Observation, records: Sequence[Record], study: Study) -> Observation:
+    """The same rows of W beside the torques of other records, whose times are those of the records observed: positions are not looked at."""
+    Y, every = np.empty_like(observation.Y), replace(study.rows, trim=0, low_speed=0.0)
+    for number, record in enumerate(records):
+        selection = select_rows(record, record.q, study.signals, every)
+        own = observation.record == number
+        Y[own] = decimated_torque(record.tau, selection)[observation.joints[own], np.searchsorted(selection.t, observation.t[own])]
+    return replace(observation, Y=Y)
 
 
 def _observed_by_blocks(

@@ -251,7 +251,7 @@ def test_coupling_of_a_split_record(tmp_path):
     drives = {"ratio": [[10.0, 0.0], [5.0, 10.0]], "offset": [0.0, 0.0], "torque_constant": [1.0, 1.0]}
     model = SimpleNamespace(**{**vars(planar), "DRIVES": drives})
     records = read_records(asked.record, model, folder=tmp_path)
-    fits = coupling_fits(model, records, asked, lambda changed: observe(model, changed, asked))
+    fits = coupling_fits(model, records, asked, observe(model, records, asked), lambda changed: observe(model, changed, asked))
     assert len(records) == 2
     assert set(fits) == {"both", "position", "torque", "none"} and set(fits["both"].provenance["files"]) == {"a.npz"}
 
