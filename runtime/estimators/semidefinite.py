@@ -5,8 +5,8 @@
     margin      max t                                  subject to  P >= t 1 of every condition, rows, chi in a Space
 
 Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of chi = origin + basis w, with sizes near one as
-interior point methods want, then what the criterion adds: residuals y with y = R chi - z as an equation, so that R is not squared. A symmetric
-matrix enters by the columns of its upper triangle, entries off the diagonal times sqrt(2). K chi = X is a Space, not an equation, and holds to
+interior point methods want, then what the criterion adds: residuals y with y = R chi - z as an equation, so that R is not squared (the euclidean
+distance, of unknowns in units of their size, is). A symmetric matrix enters by the columns of its upper triangle, entries off the diagonal times sqrt(2). K chi = X is a Space, not an equation, and holds to
 rounding. Clarabel is deterministic: same problem, same bits.
 
     entropic distance, without its constants     tr M - log det M,  M = L P L' with P0 = (L'L)^-1
@@ -143,7 +143,7 @@ class Program:
 
     def __init__(self, space: Space, more: int) -> None:
         self.space, self.m = space, space.basis.shape[1]
-        self.quadratic, self.linear = np.zeros(self.m + more), np.zeros(self.m + more)
+        self.quadratic, self.linear = np.zeros((self.m + more, self.m + more)), np.zeros(self.m + more)
         self.constraints: list[tuple[Any, Array, Array]] = []  # cone, A, b: b + A x in the cone
         self.multipliers: dict[str, slice] = {}  # of each condition
 
@@ -160,13 +160,16 @@ class Program:
     def conditions_hold(self, conditions: Sequence[Condition], least: float) -> None:
         """P >= least 1 of every condition; of least 0: P >= t 1, t the last unknown, in a problem of `margin`."""
         start = sum(len(b) for _, _, b in self.constraints)
+        triangles, ones = _triangles(tuple(conditions), len(self.space.origin))
+        A, b = self.of_chi(triangles)
+        if not least:
+            A[:, -1] = -ones
+        b, end = b - least * ones, 0
         for c in conditions:
-            n, one = c.B.shape[1], triangle(np.eye(c.B.shape[1])[None])[:, 0]
-            A, b = self.of_chi(on_standard(triangle(c.B), c.numbers, len(self.space.origin)))
-            if not least:
-                A[:, -1] = -one
-            self.constraints.append((clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1), A, b - least * one))
-            self.multipliers[c.name] = slice(start, start := start + len(one))
+            n = c.B.shape[1]
+            own = slice(end, end := end + n * (n + 1) // 2)
+            self.constraints.append((clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1), A[own], b[own]))
+            self.multipliers[c.name] = slice(start + own.start, start + own.stop)
 
     def rows_hold(self, rows: LinearBounds) -> None:
         """lower <= A chi <= upper."""
@@ -192,8 +195,14 @@ class Program:
         A, b = self.of_chi(M)
         own = np.arange(first, first + len(z))
         A[np.arange(len(z)), own] = -1.0
-        self.quadratic[own] = 2 * weight
+        self.quadratic[own, own] = 2 * weight
         self.constraints.append((clarabel.ZeroConeT(len(z)), A, b - z))
+
+    def add_squared(self, M: Array, z: Array, weight: float) -> None:
+        """weight ||M chi - z||^2 in the criterion, M'M well conditioned."""
+        A, b = self.of_chi(M)
+        self.quadratic += 2 * weight * A.T @ A
+        self.linear += 2 * weight * A.T @ (b - z)
 
     def add_entropy(self, first: int, B: Array, numbers: Sequence[int], weight: float) -> None:
         """weight (tr M - log det M) in the criterion, M = sum_k chi[numbers[k]] B[k], shape (n, n); Z and log Z_ii are unknowns from `first` on."""
@@ -215,7 +224,7 @@ class Program:
     def solve(self) -> tuple[str, Array, dict[str, float]]:
         """Status, x, and the trace of the multiplier of each condition."""
         cones, A, b = zip(*self.constraints, strict=True)
-        Q, given = sparse.diags(self.quadratic, format="csc"), sparse.csc_matrix(-np.vstack(A))
+        Q, given = sparse.csc_matrix(np.triu(self.quadratic)), sparse.csc_matrix(-np.vstack(A))
         status = ""
         for gap, feasible in TOLERANCES:
             settings = clarabel.DefaultSettings()
@@ -246,10 +255,7 @@ def closest(
     """
     space, rows = within(space, rows)
     squares, entropies = [(R, z, 1.0)], []
-    if pull is not None and pull.kind == "euclidean":
-        numbers = list(pull.numbers)
-        squares.append((np.eye(len(pull.chi0))[numbers] / pull.scale[numbers, None], (pull.chi0 / pull.scale)[numbers], pull.weight))
-    elif pull is not None:
+    if pull is not None and pull.kind != "euclidean":
         for c in (c for c in conditions if c.name.startswith("link ")):
             L = np.linalg.inv(np.linalg.cholesky(c.matrix(pull.chi0)))
             B = L @ c.B @ L.T  # the identity at chi0
@@ -263,6 +269,9 @@ def closest(
     program = Program(space, residuals + sum(14 for _ in entropies))
     program.conditions_hold(conditions, least)
     program.rows_hold(rows)
+    if pull is not None and pull.kind == "euclidean":
+        numbers = list(pull.numbers)
+        program.add_squared(np.eye(len(pull.chi0))[numbers] / pull.scale[numbers, None], (pull.chi0 / pull.scale)[numbers], pull.weight)
     first = program.m
     for M, value, weight in squares:
         program.add_squares(first, M, value, weight)
@@ -311,6 +320,13 @@ def triangle(B: Array) -> Array:
     """Columns of the upper triangles of symmetric matrices, shape (k, n, n), entries off the diagonal times sqrt(2): shape (n (n + 1)/2, k)."""
     i, j, factor = _upper(B.shape[1])
     return np.asarray((B[:, i, j] * factor).T)
+
+
+@lru_cache(maxsize=8)
+def _triangles(conditions: tuple[Condition, ...], p: int) -> tuple[Array, Array]:
+    """Triangles of the conditions on p standard parameters, one below the other, shape (rows, p), and those of the identity, (rows,)."""
+    ones = [triangle(np.eye(c.B.shape[1])[None])[:, 0] for c in conditions]
+    return np.vstack([on_standard(triangle(c.B), c.numbers, p) for c in conditions] or [np.zeros((0, p))]), np.concatenate([*ones, []])
 
 
 @lru_cache(maxsize=32)

@@ -6,7 +6,7 @@ W depends on the positions alone: two observations serve all four, of which that
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias, overload
 
 import numpy as np
@@ -27,11 +27,24 @@ COUPLINGS: tuple[Coupling, ...] = ("both", "position", "torque", "none")
 
 
 def coupling_fits(
-    model: GeneratedModel, records: Sequence[Record | Stream], study: Study, observation: Observation, observed: Observed
+    model: GeneratedModel, records: Sequence[Record | Stream], study: Study, observation: Observation, fit: Estimate, observed: Observed
 ) -> dict[Coupling, Estimate]:
     """Estimates of all parameters by the coupling used; empty unless all records are of the motor side of coupled drives.
 
-    observation : that of the records as they are.   observed : the rows of records that were read with another coupling.
+    Parameters
+    ----------
+    model : GeneratedModel
+        Emitted module.
+    records : sequence of Record or Stream
+        As they were read.
+    study : Study
+        Settings.
+    observation : Observation
+        Rows of the records as they are.
+    fit : Estimate
+        Of all parameters from these rows.
+    observed : callable
+        The rows of records that were read with another coupling.
     """
     read_with = [settings.coupling for settings in study.record]
     if len(records) != len(study.record):  # a record that was split at gaps, or records from elsewhere
@@ -43,20 +56,20 @@ def coupling_fits(
         return {}
     simulated = study.estimate.method in CLOSED_LOOP
     method = linear_companion(study.estimate) if simulated else point_estimate(study.estimate)
-    rows: dict[bool, Observation] = {}  # by whether positions are coupled
     used = read_with[0] if len(set(read_with)) == 1 and not simulated else None
-    if used is not None:
-        rows[turned(used)] = observation
+    rows = {} if used is None else {turned(used): observation}  # by whether positions are coupled
+    whole = [record for record in records if isinstance(record, Record)]
     fits: dict[Coupling, Estimate] = {}
     for coupling in COUPLINGS:
-        changed = [recoupled(r, drives.decoupled(own), drives.decoupled(coupling)) for r, own in zip(records, read_with, strict=True)]
-        whole = [record for record in changed if isinstance(record, Record)]
+        changes = [Change(drives.decoupled(own), drives.decoupled(coupling)) for own in read_with]
         if coupling == used:
-            own_rows = observation
-        elif turned(coupling) in rows and len(whole) == len(changed):
-            own_rows = with_torques(rows[turned(coupling)], whole, study)
+            fits[coupling] = fit
+            continue
+        if turned(coupling) in rows and len(whole) == len(records):
+            torques = [change.torque(record.tau) for change, record in zip(changes, whole, strict=True)]
+            own_rows = with_torques(rows[turned(coupling)], whole, torques, study)
         else:
-            own_rows = rows[turned(coupling)] = observed(changed)
+            own_rows = rows[turned(coupling)] = observed([recoupled(r, c.used, c.wanted) for r, c in zip(records, changes, strict=True)])
         fits[coupling] = estimate_of(own_rows, method, model=model)
     return fits
 
@@ -66,6 +79,22 @@ def turned(coupling: Coupling) -> bool:
     return coupling in ("both", "position")
 
 
+@dataclass(frozen=True, eq=False)
+class Change:
+    """From the joint side by the drives that a record was read with to the joint side by other drives."""
+
+    used: Drives
+    wanted: Drives
+
+    def torque(self, tau: Array) -> Array:
+        """Joint torques, shape (N, n), N m or N."""
+        return self.wanted.joint_torque(self.used.motor_command(tau))
+
+    def __call__(self, q: Array, tau: Array) -> tuple[Array, Array]:
+        """Joint positions and torques, shape (N, n) each."""
+        return self.wanted.joint_position(self.used.motor_position(q)), self.torque(tau)
+
+
 @overload
 def recoupled(record: Record, used: Drives, wanted: Drives) -> Record: ...
 @overload
@@ -73,9 +102,7 @@ def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record |
 def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record | Stream:
     """The record as the drives `wanted` would have turned its motor side into the joint side; `used` are those it was read with."""
 
-    def change(q: Array, tau: Array) -> tuple[Array, Array]:
-        return wanted.joint_position(used.motor_position(q)), wanted.joint_torque(used.motor_command(tau))
-
+    change = Change(used, wanted)
     if not isinstance(record, Record):
         return ChangedStream.of(record, change)
     q, tau = change(record.q, record.tau)

@@ -149,7 +149,7 @@ def identify(
         homogeneity=homogeneity({**each, **parts}, reduced.names, study.estimate, model=model) if each else None,
         missing=tuple(missing),
         correlations=weak_directions(observation, study.estimate),
-        coupling=coupling_fits(model, records, study, observation, partial(observed, windows=())),
+        coupling=coupling_fits(model, records, study, observation, fit, partial(observed, windows=())),
         uncertainty=uncertainty(observation, study.estimate, reduced, comparison),
     )
     whole = whole_records(records) if friction or study.payload is not None else []

@@ -2,7 +2,8 @@
 
     model = compiled_model(load_model("tx40"))          # generated/tx40.c beside generated/tx40.py
 
-The object lies in a cache that is checked (`runtime.model.compile_cache`). One tile of every function is compared with NumPy.
+The object lies in a cache that is checked (`runtime.model.compile_cache`). One tile of every function is compared with NumPy. A study that needs some
+columns alone has their signals compiled apart (`CompiledModel.signals_alone`).
 
 A C file runs as it is, unlike a module (`runtime.model.loading`): compile only what you emitted yourself.
 """
@@ -12,7 +13,7 @@ from __future__ import annotations
 import ctypes
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,8 +22,9 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.model.compile_cache import FallbackWarning, NotCompiledError, cache_folder, shared_object
+from runtime.model.compile_cache import FLAGS, FallbackWarning, NotCompiledError, cache_folder, shared_object
 from runtime.model.generated import GeneratedModel, ModelText
+from runtime.model.narrowing import narrowed_source
 
 Array = np.ndarray
 
@@ -52,8 +54,8 @@ def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: 
     try:
         path = source or _beside(model)
         text = _text(path)
-        library = shared_object(path, text, cache or cache_folder(), lambda opened: _opened(opened, model))
-        compiled = CompiledModel(model, library, text)
+        folder = cache or cache_folder()
+        compiled = CompiledModel(model, shared_object(path, text, folder, lambda opened: _opened(opened, model, STATES)), text, folder)
         compiled.check()
         return cast(GeneratedModel, compiled)
     except (NotCompiledError, OSError) as e:
@@ -99,8 +101,8 @@ class SignalTable:
 class CompiledModel:
     """The API of the generated module; what the C file lacks is that of the module. `module`: that module. `signals`: for other C code. `source`: the C file's text."""
 
-    def __init__(self, model: GeneratedModel, library: ctypes.CDLL, source: bytes) -> None:
-        self.module, self._library, self.source = model, library, source
+    def __init__(self, model: GeneratedModel, library: ctypes.CDLL, source: bytes, cache: Path) -> None:
+        self.module, self._library, self.source, self._cache = model, library, source, cache
         self.signals = _signals(library, model)
         self._n, self._b = len(model.JOINTS), len(model.BASE_PARAMETERS)
         self._large = _large()
@@ -150,6 +152,16 @@ class CompiledModel:
             result, expected = (getattr(m, name)(*arguments) for m in (self, self.module))
             if not np.abs(result - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
                 raise NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
+
+    def signals_alone(self, wanted: Sequence[int]) -> SignalTable:
+        """The table of signals, whose function fills the rows `wanted` alone, in the same bits; `signals` where they cannot be compiled."""
+        text = narrowed_source(self.source.decode(), wanted).encode()
+        path, flags = Path(f"{self.module.NAME}.c"), (*FLAGS, "-DSIGNALS_ONLY")
+        try:
+            library = shared_object(path, text, self._cache, lambda opened: _opened(opened, self.module, ("signals",)), flags)
+        except (NotCompiledError, OSError):
+            return self.signals
+        return _signals(library, self.module)
 
     def _filled_store(self, q: Array, qd: Array, qdd: Array, out: Array | None, constants: Mapping[str, float]) -> Array:
         states = self._states("regressor", (q, qd, qdd))
@@ -260,12 +272,12 @@ def _text(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def _opened(path: Path, model: GeneratedModel) -> ctypes.CDLL:
-    """The object, if it speaks this ABI and stems from the robot file of the model."""
+def _opened(path: Path, model: GeneratedModel, functions: Iterable[str]) -> ctypes.CDLL:
+    """The object, if it speaks this ABI, stems from the robot file of the model and has the functions."""
     library = ctypes.CDLL(str(path))
     try:
         abi, sha256 = getattr(library, f"{model.NAME}_abi"), getattr(library, f"{model.NAME}_source_sha256")
-        for name in STATES:
+        for name in functions:
             getattr(library, f"{model.NAME}_{name}").restype = ctypes.c_int32
     except AttributeError as e:
         raise NotCompiledError(f"the C file is not that of {model.NAME}: {e}") from e

@@ -1,13 +1,15 @@
-"""An emitted module whose regressor evaluates some entries alone: what only the others need is left out of its text.
+"""An emitted regressor that evaluates some entries alone: what only the others need is left out of its text, in NumPy or C.
 
-The body of a regressor is straight-line code, so that one pass from its end finds what the wanted entries D[k, j] need. Shapes stay: the other
-entries of a store are never written. Same operations on the same numbers, hence the same bits.
+The body of a regressor is straight-line code, so that one pass from its end finds what the wanted entries need: D[k, j] of a module, signals D[s]
+of a C file. Shapes stay: the other entries are never written. Same operations on the same numbers, hence the same bits.
 """
 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Collection
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import cast
@@ -16,6 +18,10 @@ from runtime.model.generated import GeneratedModel
 from runtime.model.loading import run
 
 BLOCK = "_regressor_block"  # fills D, shape (b, n, N)
+TILE = "/* One tile of regressor"  # begins each C function of the body: its parts, then the one that calls them, which has loops of its own before
+BODY_ENDS = "/* Entries that are not zero"
+STATEMENT = re.compile(r"\s*(?:const double )?(?P<target>\w+(?:\[\d+\]\[t\])?) = (?P<value>[^;]*);")
+VALUE = re.compile(r"\w+\[\d+\]\[t\]|[A-Za-z_]\w*")
 
 
 def narrowed(model: GeneratedModel, entries: Collection[tuple[int, int]]) -> GeneratedModel:
@@ -37,6 +43,26 @@ def narrowed(model: GeneratedModel, entries: Collection[tuple[int, int]]) -> Gen
         return model
     block.body = _needed(block.body, {f"D[{k}, {j}]" for k, j in entries})
     return cast(GeneratedModel, run(ast.unparse(tree), Path(str(model.__file__))))
+
+
+def narrowed_source(text: str, signals: Collection[int]) -> str:
+    """The C file of a model, its regressor giving the distinct `signals` alone, by their numbers."""
+    lines = text.split("\n")
+    starts = [k for k, line in enumerate(lines) if line.startswith(TILE)]
+    end = next((k for k, line in enumerate(lines) if line.startswith(BODY_ENDS)), 0)
+    functions = [range(a, b) for a, b in pairwise([*starts, end])]
+    needed = {f"D[{s}][t]" for s in signals}
+    unused = set()
+    for k in reversed([k for function in [*functions[-1:], *functions[:-1]] for k in function]):
+        statement = STATEMENT.match(lines[k])
+        if statement is None:
+            continue
+        if statement["target"] in needed:
+            needed.discard(statement["target"])  # written here: what it held before is not needed
+            needed.update(VALUE.findall(statement["value"]))
+        else:
+            unused.add(k)
+    return "\n".join(line for k, line in enumerate(lines) if k not in unused)
 
 
 def _needed(body: list[ast.stmt], wanted: set[str]) -> list[ast.stmt]:

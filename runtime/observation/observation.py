@@ -174,13 +174,13 @@ def observation_from_states(
     )
 
 
-def with_torques(observation: Observation, records: Sequence[Record], study: Study) -> Observation:
-    """The same rows of W beside the torques of other records, whose times are those of the records observed: positions are not looked at."""
+def with_torques(observation: Observation, records: Sequence[Record], torques: Sequence[Array], study: Study) -> Observation:
+    """The same rows of W beside other torques, shape (N, n), of the records observed."""
     Y, every = np.empty_like(observation.Y), replace(study.rows, trim=0, low_speed=0.0)
-    for number, record in enumerate(records):
+    for number, (record, tau) in enumerate(zip(records, torques, strict=True)):
         selection = select_rows(record, record.q, study.signals, every)
         own = observation.record == number
-        Y[own] = decimated_torque(record.tau, selection)[observation.joints[own], np.searchsorted(selection.t, observation.t[own])]
+        Y[own] = decimated_torque(tau, selection)[observation.joints[own], np.searchsorted(selection.t, observation.t[own])]
     return replace(observation, Y=Y)
 
 

@@ -167,6 +167,23 @@ def test_signals(tmp_path: Path) -> None:
 
 
 @needs_compiler
+def test_signals_alone(model: GeneratedModel, warm: Path, tmp_path: Path) -> None:
+    """Some signals: the bits of all of them; the rows of the others are left as they were."""
+    c = in_c(model, shutil.copytree(warm, tmp_path / "cache"))
+    wanted = list(range(0, c.signals.count, 3))
+    pointer, integer = ctypes.c_void_p, ctypes.c_int64
+    rows, constants = states(c.signals.tile).transpose(0, 2, 1).copy(), np.array([*model.CONSTANTS.values()])
+    results = []
+    for table in (c.signals, c.signals_alone(wanted)):
+        U = np.full((table.count, table.tile), np.nan)
+        fill = ctypes.CFUNCTYPE(ctypes.c_int32, integer, pointer, pointer, pointer, integer, pointer, pointer, integer)(table.address)
+        assert fill(table.tile, *(x.ctypes.data for x in rows), table.tile, constants.ctypes.data, U.ctypes.data, table.tile) == 0
+        results.append(U)
+    every, some = results
+    assert np.array_equal(every[wanted], some[wanted]) and np.isnan(np.delete(some, wanted, axis=0)).all()
+
+
+@needs_compiler
 def test_large_results_are_streamed(model: GeneratedModel, warm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     c, given = in_c(model, warm), states(203)
     ordinary = c.regressor(*given).copy()

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from runtime import estimate, observe, read_record, resample
 from runtime.errors import InputError
-from runtime.identification.coupling import coupling_fits
+from runtime.identification.coupling import coupling_fits, recoupled
+from runtime.model.drives import Drives
 from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import are_large, open_stream, records_or_streams
 from runtime.records.record import Record
@@ -251,9 +252,14 @@ def test_coupling_of_a_split_record(tmp_path):
     drives = {"ratio": [[10.0, 0.0], [5.0, 10.0]], "offset": [0.0, 0.0], "torque_constant": [1.0, 1.0]}
     model = SimpleNamespace(**{**vars(planar), "DRIVES": drives})
     records = read_records(asked.record, model, folder=tmp_path)
-    fits = coupling_fits(model, records, asked, observe(model, records, asked), lambda changed: observe(model, changed, asked))
+    observation = observe(model, records, asked)
+    fit, used = estimate(model, observation, asked), Drives.from_mapping(drives)
+    fits = coupling_fits(model, records, asked, observation, fit, lambda changed: observe(model, changed, asked))
     assert len(records) == 2
-    assert set(fits) == {"both", "position", "torque", "none"} and set(fits["both"].provenance["files"]) == {"a.npz"}
+    assert set(fits) == {"both", "position", "torque", "none"} and fits["both"] is fit
+    for coupling in fits:
+        changed = [recoupled(record, used, used.decoupled(coupling)) for record in records]
+        np.testing.assert_allclose(fits[coupling].X, estimate(model, changed, asked).X, rtol=1e-9)
 
 
 # --- remedies -----------------------------------------------------------------------------------------------------------

@@ -203,6 +203,8 @@ class SignalEntries:
         Signals that occur.
     number : ndarray
         Position in `wanted` of the signal of each entry.
+    table : SignalTable
+        Function that gives the wanted signals.
     """
 
     def __init__(self, model: CompiledModel, names: Sequence[str]) -> None:
@@ -220,6 +222,7 @@ class SignalEntries:
         self.sign = np.ascontiguousarray(table.sign[order], dtype=float)
         self.wanted, number = np.unique(table.signal[order].astype(np.int32), return_inverse=True)
         self.number: Array = number.reshape(-1).astype(np.int32)
+        self.table = table if len(self.wanted) == table.count else model.signals_alone(self.wanted.tolist())
 
 
 def constant_values(model: CompiledModel, constants: Mapping[str, float]) -> Array:
@@ -249,7 +252,7 @@ def decimated(
     p = decimation_plan(samples.stop - samples.start, factor, settings)
     if p is None:
         return _every_sample(entries, states, samples, constants, room)
-    table, S = entries.model.signals, len(entries.wanted)
+    table, S = entries.table, len(entries.wanted)
     most = _blocks_together(p.L, table.tile)
     length = -(-max(len(p.X0), len(p.A), p.L * most) // table.tile) * table.tile
     U, rows = room.array("U", table.count * length), room.array("rows", 3, states.n, table.tile)
@@ -269,7 +272,7 @@ def _blocks_together(L: int, tile: int) -> int:
 
 def _every_sample(entries: SignalEntries, states: FilteredStates, samples: slice, constants: Array, room: Room) -> Array:
     """The wanted signals at all samples, shape (S, N)."""
-    N, table = samples.stop - samples.start, entries.model.signals
+    N, table = samples.stop - samples.start, entries.table
     U, rows = room.array("U", table.count, N), states.rows(samples)
     pointers = [ctypes.c_void_p(address(x)) for x in (*rows, constants, U)]
     size = ctypes.c_int64(N)
