@@ -7,6 +7,7 @@ import pytest
 
 from runtime import InputError, read_record
 from runtime.records.formats import text
+from runtime.records.formats.columns import Source
 
 rng = np.random.default_rng(3)
 
@@ -39,6 +40,25 @@ def test_both_ways_give_the_same_bits(tmp_path, monkeypatch):
     long = read_record(tmp_path / "plain.csv")
     for other in (by_lines, long):
         assert other.q.tobytes() == plain.q.tobytes() and other.tau.tobytes() == plain.tau.tobytes()
+
+
+@pytest.mark.parametrize("comment", [None, 3, 300, 401])
+def test_long_files_are_read_in_pieces(tmp_path, monkeypatch, comment):
+    """Up to the first line of another kind, from where on they are read by lines; no sample is lost or read twice."""
+    lines, begun = sampled_lines(), []
+    expected = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
+    if comment:
+        lines.insert(comment, "# a comment")
+    monkeypatch.setattr(text, "HELD", 1000)
+    monkeypatch.setattr(text, "PIECE", 500)
+    by_lines = text.TextTable._parts_by_lines
+    monkeypatch.setattr(text.TextTable, "_parts_by_lines", lambda *given: begun.append(given[-1]) or by_lines(*given))
+    table = text.open_text(Source(written(tmp_path / "run.csv", lines)))
+    assert table.samples([["t"]]) == len(expected)
+    blocks = [np.stack(block) for block in table.parts(["tau1", "t"], 64)]
+    assert [block.shape[1] for block in blocks] == [64] * 6 + [16]
+    assert np.array_equal(np.concatenate(blocks, axis=1).T, expected[:, [2, 0]])
+    assert begun == {None: [], 3: [0], 300: [256], 401: [384]}[comment]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@ comma where that is said."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,17 +16,20 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.files import opened
 from runtime.records.formats.columns import WIDEST, Array, Groups, Source, Table
+from runtime.records.stream import Queue
 
 LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits each
 HELD = 2**25  # characters of a file whose numbers are all kept: they are read once
+PIECE = 2**22  # characters of a longer one, read at a time
 MOST_EMPTY = 5_000_000  # lines without a number
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
 
 
 @dataclass(eq=False, kw_only=True)
 class TextTable(Table):
-    """Lines of a text file. A file of at most HELD characters that holds nothing but numbers under its header is read at once, by NumPy alone;
-    of any other each line is turned into numbers when its block is read, and what is wrong with it is told by line and column."""
+    """Lines of a text file. Where nothing but numbers stand under the header NumPy reads them, of a file of at most HELD characters at once and once,
+    of a longer one in pieces. From the first piece on that holds anything else, or is wrong, each line is read by itself, and what is wrong with it
+    is told by line and column."""
 
     what = "a text file"
 
@@ -35,18 +39,29 @@ class TextTable(Table):
 
     def samples(self, groups: Groups) -> int:
         self.require([name for group in groups for name in group])
-        count = sum(1 for _ in self._lines()) if self._numbers is None else len(self._numbers)
+        count = self._count if self._numbers is None else len(self._numbers)
         if not count:
             raise InputError(f"no line of numbers under the header {', '.join(self.names)}", file=self.file)
         return count
 
     def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
         indices = [self.names.index(name) for name in names]
-        if self._numbers is not None:
-            for first in range(0, len(self._numbers), size):
-                yield list(self._numbers[first : first + size, indices].T)
-            return
-        lines = self._lines()
+        waiting, done = Queue(), 0
+        try:
+            for numbers in map(self._loaded, self._pieces()) if self._numbers is None else [self._numbers]:
+                waiting.put(numbers[:, indices])
+                while waiting.count >= size:
+                    yield list(waiting.take(size).T)
+                    done += size
+        except ValueError:
+            yield from self._parts_by_lines(indices, size, done)
+        else:
+            if waiting.count:
+                yield list(waiting.take(waiting.count).T)
+
+    def _parts_by_lines(self, indices: list[int], size: int, done: int) -> Iterator[Sequence[Array]]:
+        """The samples from number `done` on."""
+        lines = islice(self._lines(), done, None)
         while block := list(islice(lines, size)):
             numbers, texts = zip(*block, strict=True)
             self.require_widths(numbers, texts)
@@ -55,6 +70,35 @@ class TextTable(Table):
                 yield list(np.loadtxt(plain, delimiter=self.delimiter, usecols=indices, ndmin=2, comments=None, quotechar='"').T)
             except ValueError:
                 raise self._not_a_number(indices, numbers, plain) from None
+
+    def _pieces(self) -> Iterator[str]:
+        """What stands under the header, in pieces of whole lines; ValueError where a line is no line of numbers with decimal points."""
+        if self.source.decimal != ".":
+            raise ValueError("decimal comma")
+        with opened(self.source.path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
+            first = next((line for line in text if line.strip() and not line.lstrip().startswith("#")), "")
+            rest = "" if self.has_header else first
+            while block := text.read(PIECE):
+                lines, newline, rest = (rest + block).rpartition("\n")
+                if newline:
+                    yield _regular(lines)
+            if rest:
+                yield _regular(rest)
+
+    def _loaded(self, lines: str) -> Array:
+        """Numbers, shape (B, len(names)); ValueError where there is anything else."""
+        numbers = np.loadtxt(StringIO(lines), delimiter=self.delimiter, ndmin=2, comments=None, quotechar='"')
+        if numbers.shape[1] != len(self.names):
+            raise ValueError("columns")
+        return numbers
+
+    @cached_property
+    def _count(self) -> int:
+        """Lines of numbers."""
+        try:
+            return sum(piece.count("\n") + 1 for piece in self._pieces())
+        except ValueError:
+            return sum(1 for _ in self._lines())
 
     @cached_property
     def _numbers(self) -> Array | None:
@@ -65,10 +109,9 @@ class TextTable(Table):
             lines = whole.partition("\n")[2] if self.has_header else whole
             if len(whole) > HELD or "#" in whole or self.source.decimal != "." or not lines.strip():
                 return None
-            numbers = np.loadtxt(StringIO(lines), delimiter=self.delimiter, ndmin=2, comments=None, quotechar='"')
+            return self._loaded(lines)
         except ValueError:  # the file is read again by lines, which tells where
             return None
-        return numbers if numbers.shape[1] == len(self.names) else None
 
     def row(self, i: int) -> str:
         return f"line {next(islice(self._lines(), i, None))[0]}"
@@ -141,6 +184,14 @@ def _numbered_lines(source: Source) -> Iterator[tuple[int, str]]:
                     raise InputError(f"more than {MOST_EMPTY} lines are empty or comments; expected one sample a line", file=source.file)
     except UnicodeDecodeError as e:
         raise InputError(f"not a text file in UTF-8 (byte {e.start} of a block); {UTF8}", file=source.file) from None
+
+
+def _regular(lines: str) -> str:
+    """The lines without empty ones at their ends; ValueError where one of them is empty, indented or a comment, or none is left."""
+    lines = lines.strip("\n")
+    if "#" in lines or not lines or lines[0].isspace() or re.search(r"\n\s", lines):
+        raise ValueError("lines of another kind")
+    return lines
 
 
 def _fields(line: str, delimiter: str | None) -> list[str]:
