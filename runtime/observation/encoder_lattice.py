@@ -28,8 +28,8 @@ JUMP = 30
 """A change of the count this many times its neighbours is none of a motion."""
 SHAKEN = 0.01
 """Share of the changes of an encoder that cross a line the third time in a row, from which its motion counts as shaken."""
-FEWEST = 100
-"""Changes from which a share is one."""
+FEWEST = 1000
+"""Changes from which a share is one: ten such passages at least, since a coarse encoder sees one or two where a joint turns back near a line."""
 
 
 @dataclass(frozen=True, eq=False)
