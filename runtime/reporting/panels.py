@@ -17,13 +17,13 @@ POINT = 1 / 72  # inch
 LETTER, LINE, LABEL = 0.64, 1.3, 1.6  # width of a digit, height of a line, of a label with the space to it: in sizes of the letters
 SIZE = 9.0  # points, of titles and labels
 TICK = 0.11  # inch, a tick and the space to its label
-EDGE, BETWEEN = 0.06, 0.12  # inch, to the edge of the figure and between panels
+EDGE = 0.06  # inch, to the edge of the figure and between rows
 
 
 class PanelLayout(LayoutEngine):
     """Panels of one grid, each with room for its ticks, labels and title, below the legend of the figure.
 
-    right, below : further room to the right of the last column, and below every panel, inch.
+    right, below : room to the right of every panel, and further room below it, inch.
     """
 
     _adjust_compatible = True
@@ -53,14 +53,14 @@ class PanelLayout(LayoutEngine):
             fig.get_figwidth(),
             left[0] + EDGE + (line if fig.get_supylabel() else 0.0),
             self.right,
-            max(left[1:], default=0.0) + BETWEEN,
+            max(left[1:], default=0.0) + self.right,
             grid.ncols,
         )
         vertical = _spread(
             fig.get_figheight(),
             below[-1] + EDGE + (line if fig.get_supxlabel() else 0.0),
             above[0] + EDGE + sum(legend.get_window_extent().height / fig.dpi for legend in fig.legends),
-            max((b + a for b, a in zip(below, above[1:], strict=False)), default=0.0) + BETWEEN / 2,
+            max((b + a for b, a in zip(below, above[1:], strict=False)), default=0.0) + EDGE,
             grid.nrows,
         )
         return dict(zip(("left", "right", "wspace", "bottom", "top", "hspace"), (*horizontal, *vertical), strict=True))

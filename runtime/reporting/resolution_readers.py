@@ -31,7 +31,7 @@ def readers_figure(by_positions: Cestac, by_counts: Cestac, names: Sequence[str]
     i = by_positions.names.index(key)
     unit = by_positions.reference.units.get(key, "").replace("**", "^").replace("*", " ")
     with mpl.rc_context(STYLE):
-        figure, (left, right) = panels_figure(1, 2, (9.6, 4.2), below=0.25)
+        figure, (left, right) = panels_figure(1, 2, (9.6, 4.2), right=0.35, below=0.25)
         for result, (label, color, marker) in zip((by_positions, by_counts), READ, strict=True):
             delta, rms, largest = errors(result, names)
             left.plot(delta, rms, color=color, marker=marker, markersize=5, linewidth=1.6, label=label)
