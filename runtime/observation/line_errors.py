@@ -34,6 +34,8 @@ WEAK = 0.06
 PASSES = 2
 FEWEST = 50
 """Changes below which lines count as even."""
+POOR = 0.8
+"""Share of the deviation that is left, from which lines count as not estimated."""
 CROSSINGS, ENOUGH = 5, 20
 """Crossings from which a line is estimated by itself, and the number of such lines that tell how much they differ."""
 MOST = 1500
@@ -140,21 +142,30 @@ def line_errors(
         if deviation > SIZES[-1]:
             densities[j] = all_sizes[deviation][1][j]
         if deviation == SIZES[-1] or not estimate:
-            text = f"lines uneven by {deviation:g} steps (rms); bounds are widened" if deviation > SIZES[-1] else ""
-            errors.append(LineErrors(deviation, 0, np.zeros(0), deviation, text))
+            text = f"lines are uneven by {deviation:g} steps (rms); bounds and stated deviations are widened, lines: estimated asks for their places"
+            errors.append(LineErrors(deviation, 0, np.zeros(0), deviation, text if deviation > SIZES[-1] else ""))
         else:
             alone = Basis(basis.N, 1, basis.m, Ts)
             rows = slice(j, j + 1)
-            place, shift, left, single = _shifts(alone, each, (weak[0][rows], weak[1][rows]), speed[j], densities[rows], deviation)
-            text = f"lines uneven by {deviation:g} steps (rms); period of four and {single} single lines estimated, {left:.2g} steps left"
-            errors.append(LineErrors(deviation, place, shift, left, text))
+            place, shift, left, period, single = _shifts(alone, each, (weak[0][rows], weak[1][rows]), speed[j], densities[rows], deviation)
+            errors.append(LineErrors(deviation, place, shift, left, _text(deviation, left, period, single)))
     return errors, densities
+
+
+def _text(deviation: float, left: float, period: float, single: int) -> str:
+    """What became of lines of that deviation: left of it, of the pattern that repeats every four lines, and of single ones; steps, rms."""
+    size = f"lines are uneven by {deviation:g} steps (rms)"
+    if left > POOR * deviation:
+        return f"{size}; this motion does not tell their places, bounds and stated deviations are widened by {left:.2g} steps: cross each line more often"
+    return (
+        f"{size}, {period:.2g} of it repeat every four lines; {single} single lines estimated, bounds widened by the {left:.2g} steps left"
+    )
 
 
 def _shifts(
     basis: Basis, changes: Changes, weak: tuple[Array, Array], speed: Array, density: Array, deviation: float
-) -> tuple[int, Array, float, int]:
-    """Shifts of all lines from the first one crossed on, the deviation left, and how many lines have a shift of their own."""
+) -> tuple[int, Array, float, float, int]:
+    """Shifts of all lines from the first one crossed on, the deviation left, that of period four, and how many lines have a shift of their own."""
     first, last = int(changes.number.min()), int(changes.number.max())
     place = changes.number - first
     size = last - first + 1
@@ -203,4 +214,4 @@ def _shifts(
     unknown = np.ones(len(place)) * variance_own
     unknown[of >= 0] = np.diag(C)[of[of >= 0]]
     left = float(np.sqrt(np.mean(unknown)))
-    return first, shift, max(left, SIZES[-1]), len(own)
+    return first, shift, max(left, SIZES[-1]), float(np.sqrt(np.mean(delta[len(own) :] ** 2))), len(own)

@@ -214,7 +214,7 @@ def test_uneven_lines_are_detected_and_estimated():
         reading = read_counts(position, RATE, step, lines=lines)
         errors[lines] = np.sqrt(((reading.q - q - np.mean(reading.q - q, axis=0)) ** 2).mean())
         if lines != 0.01:
-            assert any("lines uneven" in text for text in reading.findings), lines
+            assert any("lines are uneven by 0.12 steps" in text for text in reading.findings), lines
     assert errors["estimated"] < 0.6 * errors["detected"] and errors["detected"] < 1.05 * errors[0.01], errors
     assert not read_counts(counted(q, step), RATE, step).findings
 
