@@ -53,6 +53,29 @@ def merged(parts: Iterable[Sequence[JointFactor]]) -> tuple[JointFactor, ...]:
     )
 
 
+def cut(W: Array, Y: Array, joints: Sequence[slice], blocks: Array) -> tuple[Segment, ...]:
+    """Segments of rows that are held: one for each block of residuals.
+
+    Parameters
+    ----------
+    W, Y : ndarray, shape (r, b) and (r,)
+    joints : sequence of slice
+        Rows of each joint.
+    blocks : ndarray of int, shape (r,)
+        Number of the block of each row, from 0.
+    """
+    if not (np.isfinite(W).all() and np.isfinite(Y).all()):
+        raise ValueError("W or Y holds values that are not finite; leave those samples out of the record")
+    factors = []
+    for own in joints:
+        columns = np.flatnonzero(W[own].any(axis=0))
+        order, counts = np.argsort(blocks[own], kind="stable"), np.bincount(blocks[own], minlength=int(blocks.max()) + 1)
+        rows = np.vstack([W[own].T[columns], Y[own]])[:, order]
+        parts = np.split(rows, np.cumsum(counts)[:-1], axis=1)
+        factors.append([JointFactor(columns, triangularise(part.T), part.shape[1]) for part in parts])
+    return tuple(Segment(0, k, (), same) for k, same in enumerate(zip(*factors, strict=True)))
+
+
 class HeldRows:
     """The first rows of several records in the order of an Observation: joint by joint, records one after the other.
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.observation.qr_factor import Factor, factor, selected
-from runtime.observation.segments import Segment, Window, merged
+from runtime.observation.segments import Segment, Window, cut, merged
 
 Array = np.ndarray
 
@@ -149,9 +149,18 @@ class Observation:
     @cached_property
     def factor(self) -> Factor:
         """Triangular factor of [W Y], joint by joint; made once."""
-        if self.reduced is None:
+        if self.segments is None:
             return factor(self.W, self.Y, self.rows, self.names)
-        return Factor.of(self.names, merged(s.joints for s in self.reduced.segments))
+        return Factor.of(self.names, merged(s.joints for s in self.segments))
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...] | None:
+        """Triangular factors of the blocks of residuals, made once; None where such a block of one joint has hardly more rows than columns."""
+        if self.reduced:
+            return self.reduced.segments
+        if max(self.rows) < 2 * BLOCKS * (len(self.names) + 1):
+            return None
+        return cut(self.W, self.Y, [self.joint(j) for j in range(self.n)], self.blocks())
 
     def columns(self, names: Sequence[str]) -> Observation:
         """The same rows with the named columns alone, in the order given."""
@@ -172,7 +181,7 @@ class Observation:
             raise InputError(f"mask {mask.dtype} {mask.shape}; expected bool {self.Y.shape}")
         rows = tuple(int(np.count_nonzero(mask[self.joint(j)])) for j in range(self.n))
         loop = None if self.closed_loop is None else replace(self.closed_loop, rows=self.closed_loop.rows[mask])
-        W = np.asfortranarray(self.W[mask])
+        W = np.compress(mask, self.W.T, axis=1).T
         return replace(self, W=W, Y=self.Y[mask], t=self.t[mask], record=self.record[mask], rows=rows, closed_loop=loop)
 
     def between(self, t0: float | None, t1: float | None) -> Observation:
@@ -225,7 +234,7 @@ class Observation:
         return np.asarray(np.unique(record * (interval.max() + 1) + interval, return_inverse=True)[1])
 
     def block_rows(self, names: Sequence[str], weights: Array, length: float, whitener: Array | None = None) -> Iterator[Array]:
-        """Weighted rows [W Y] of every block of residuals, shape (rows, b + 1); of reduced ones, rows with the same Gram matrix.
+        """Weighted rows [W Y] of every block of residuals, shape (rows, b + 1); of `segments`, rows with the same Gram matrix.
 
         Parameters
         ----------
@@ -239,15 +248,15 @@ class Observation:
             Multiplies the n rows of one instant, in place of the weights.
         """
         kept = column_numbers(names, self.names)
-        if self.reduced is None:
+        if self.reduced is None and (self.segments is None or whitener is not None or length != self.residual_block):
             A = np.column_stack([self.W[:, kept], self.Y])
             A = A * np.repeat(weights, self.rows)[:, None] if whitener is None else whitened(A, whitener)
             yield from split_rows(A, self.blocks(length))
             return
-        if length != self.reduced.residual_block:
-            raise InputError(f"blocks of residuals of {length:g} s; a record read by blocks was cut into {self.reduced.residual_block:g} s")
+        if length != self.residual_block:
+            raise InputError(f"blocks of residuals of {length:g} s; a record read by blocks was cut into {self.residual_block:g} s")
         blocks: dict[tuple[int, int], list[Array]] = {}
-        for segment in self.reduced.segments:
+        for segment in self.segments or ():
             for joint, weight in zip((selected(joint, kept) for joint in segment.joints), weights, strict=True):
                 if joint.rows:
                     blocks.setdefault((segment.record, segment.block), []).append(weight * joint.spread(len(kept)))
