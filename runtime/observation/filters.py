@@ -10,6 +10,7 @@ MATLAB's filtfilt takes 3*(filter length - 1) samples, scipy's default 3*(filter
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import floor
 
 import numpy as np
@@ -100,6 +101,7 @@ def lowpass_filtered(x: Array, rate: float, low: Lowpass) -> Array:
     return zero_phase(*butterworth(rate, low), x, axis=0)
 
 
+@lru_cache(maxsize=32)
 def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
     """Second-order sections of the low-pass, shape (sections, 6), and the samples by which its ends are extended."""
     if low.cutoff >= rate / 2:

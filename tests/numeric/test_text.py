@@ -42,6 +42,18 @@ def test_both_ways_give_the_same_bits(tmp_path, monkeypatch):
         assert other.q.tobytes() == plain.q.tobytes() and other.tau.tobytes() == plain.tau.tobytes()
 
 
+@pytest.mark.parametrize("end", ["\r\n", "\r"])
+def test_ends_of_lines(tmp_path, monkeypatch, end):
+    lines = sampled_lines()
+    plain, other = read_record(written(tmp_path / "plain.csv", lines)), tmp_path / "other.csv"
+    other.write_bytes(b"\xef\xbb\xbf" + (end.join(lines) + end).encode())
+    for held in (text.HELD, 1000):
+        monkeypatch.setattr(text, "HELD", held)
+        monkeypatch.setattr(text, "PIECE", 500)
+        record = read_record(other)
+        assert record.q.tobytes() == plain.q.tobytes() and record.tau.tobytes() == plain.tau.tobytes()
+
+
 @pytest.mark.parametrize("comment", [None, 3, 300, 401])
 def test_long_files_are_read_in_pieces(tmp_path, monkeypatch, comment):
     """Up to the first line of another kind, from where on they are read by lines; no sample is lost or read twice."""

@@ -4,6 +4,7 @@ comma where that is said."""
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,15 +20,15 @@ from runtime.records.formats.columns import WIDEST, Array, Groups, Source, Table
 from runtime.records.stream import Queue
 
 LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits each
-HELD = 2**25  # characters of a file whose numbers are all kept: they are read once
-PIECE = 2**22  # characters of a longer one, read at a time
+HELD = 2**25  # bytes of a file whose numbers are all kept: they are read once
+PIECE = 2**22  # bytes of a longer one, read at a time
 MOST_EMPTY = 5_000_000  # lines without a number
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
 
 
 @dataclass(eq=False, kw_only=True)
 class TextTable(Table):
-    """Lines of a text file. Where nothing but numbers stand under the header NumPy reads them, of a file of at most HELD characters at once and once,
+    """Lines of a text file. Where nothing but numbers stand under the header NumPy reads them, of a file of at most HELD bytes at once and once,
     of a longer one in pieces. From the first piece on that holds anything else, or is wrong, each line is read by itself, and what is wrong with it
     is told by line and column."""
 
@@ -75,11 +76,14 @@ class TextTable(Table):
         """What stands under the header, in pieces of whole lines; ValueError where a line is no line of numbers with decimal points."""
         if self.source.decimal != ".":
             raise ValueError("decimal comma")
-        with opened(self.source.path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
-            first = next((line for line in text if line.strip() and not line.lstrip().startswith("#")), "")
-            rest = "" if self.has_header else first
-            while block := text.read(PIECE):
-                lines, newline, rest = (rest + block).rpartition("\n")
+        with opened(self.source.path) as stream:
+            lines_of_text = (line.removeprefix(BOM_UTF8) for line in iter(lambda: stream.readline(LONGEST + 1), b""))
+            first = next((line for line in lines_of_text if line.strip() and not line.lstrip().startswith(b"#")), b"")
+            if b"\r" in first.rstrip():
+                raise ValueError("lines that end with a carriage return alone")
+            rest = b"" if self.has_header else first
+            while block := stream.read(PIECE):
+                lines, newline, rest = (rest + block).rpartition(b"\n")
                 if newline:
                     yield _regular(lines)
             if rest:
@@ -87,7 +91,8 @@ class TextTable(Table):
 
     def _loaded(self, lines: str) -> Array:
         """Numbers, shape (B, len(names)); ValueError where there is anything else."""
-        numbers = np.loadtxt(StringIO(lines), delimiter=self.delimiter, ndmin=2, comments=None, quotechar='"')
+        quote = '"' if '"' in lines else None
+        numbers = np.loadtxt(StringIO(lines), delimiter=self.delimiter, ndmin=2, comments=None, quotechar=quote)
         if numbers.shape[1] != len(self.names):
             raise ValueError("columns")
         return numbers
@@ -104,10 +109,13 @@ class TextTable(Table):
     def _numbers(self) -> Array | None:
         """Every column, shape (N, len(names)); None where the file is long, or something in it is neither a number nor the header."""
         try:
-            with opened(self.source.path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
-                whole = text.read(HELD + 1).lstrip()
-            lines = whole.partition("\n")[2] if self.has_header else whole
-            if len(whole) > HELD or "#" in whole or self.source.decimal != "." or not lines.strip():
+            with opened(self.source.path) as stream:
+                whole = stream.read(HELD + 1)
+            if len(whole) > HELD:
+                return None
+            text = _one_newline(whole.decode("utf-8-sig")).lstrip()
+            lines = text.partition("\n")[2] if self.has_header else text
+            if "#" in text or self.source.decimal != "." or not lines.strip():
                 return None
             return self._loaded(lines)
         except ValueError:  # the file is read again by lines, which tells where
@@ -186,12 +194,17 @@ def _numbered_lines(source: Source) -> Iterator[tuple[int, str]]:
         raise InputError(f"not a text file in UTF-8 (byte {e.start} of a block); {UTF8}", file=source.file) from None
 
 
-def _regular(lines: str) -> str:
+def _regular(lines: bytes) -> str:
     """The lines without empty ones at their ends; ValueError where one of them is empty, indented or a comment, or none is left."""
-    lines = lines.strip("\n")
-    if "#" in lines or not lines or lines[0].isspace() or re.search(r"\n\s", lines):
+    text = _one_newline(lines.decode()).strip("\n")
+    if "#" in text or not text or text[0].isspace() or re.search(r"\n\s", text):
         raise ValueError("lines of another kind")
-    return lines
+    return text
+
+
+def _one_newline(text: str) -> str:
+    """The text with "\\n" at the end of every line."""
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
 def _fields(line: str, delimiter: str | None) -> list[str]:
