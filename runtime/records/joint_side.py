@@ -117,8 +117,8 @@ def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
 
 def require_finite(x: Array, names: Sequence[str], table: Table, first: int = 0) -> Array:
     """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity among them."""
-    bad = np.argwhere(~np.isfinite(x))
-    if len(bad):
+    if not np.isfinite(x).all():
+        bad = np.argwhere(~np.isfinite(x))
         i, j = bad[0]
         column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
         raise InputError(

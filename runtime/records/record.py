@@ -148,8 +148,8 @@ def known_text(known: Array) -> str:
 
 def require_finite(x: Array, label: str, file: str) -> None:
     """Raise InputError at the first value of x, shape (N,) or (N, k), that is not finite; columns are called label1, label2 ..."""
-    bad = np.argwhere(~np.isfinite(x))
-    if len(bad):
+    if not np.isfinite(x).all():
+        bad = np.argwhere(~np.isfinite(x))
         value, column = x[tuple(bad[0])], label if x.ndim == 1 else f"{label}{bad[0][1] + 1}"
         raise InputError(
             f"{value} ({len(bad)} such values in all); expected finite numbers, repair or cut the record",

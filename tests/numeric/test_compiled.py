@@ -19,6 +19,7 @@ from runtime import load_model
 from runtime.errors import InputError
 from runtime.model.compiled import CompiledModel, FallbackWarning, cache_folder, compiled_model
 from runtime.model.generated import GeneratedModel
+from runtime.resolution.c.kernels import SignalEntries
 from symgen.description import load_robot, parse_robot
 from symgen.emit.generate import generate_files
 
@@ -181,6 +182,8 @@ def test_signals_alone(model: GeneratedModel, warm: Path, tmp_path: Path) -> Non
         results.append(U)
     every, some = results
     assert np.array_equal(every[wanted], some[wanted]) and np.isnan(np.delete(some, wanted, axis=0)).all()
+    few = SignalEntries(c, model.BASE_PARAMETERS[-2:])  # what a study of two columns evaluates
+    assert len(few.wanted) < c.signals.count and few.table.address != c.signals.address
 
 
 @needs_compiler

@@ -1,6 +1,7 @@
 """`runtime.identify` and `runtime.report` from Python: records and streams mixed, records of one name, everything asked for in one result."""
 
 import json
+import pydoc
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -48,6 +49,30 @@ def test_one_record_without_a_study(model):
         root = ElementTree.fromstring(shown._repr_html_())
         assert root.find("table") is not None
     assert result.verdict in str(result) and str(result.checklist).startswith(result.checklist.answer)
+
+
+def test_work_is_done_once(model, monkeypatch):
+    """Coupled drives: two evaluations of W serve all four couplings, each with one pass of the filters; W beside its torques is factored once."""
+    evaluated, filtered, factored, positions = [], [], [], measured(model, 0)
+
+    def regressor(q, qd, qdd, **options):
+        evaluated.append(len(q))
+        return model.regressor(q, qd, qdd, **options)
+
+    drives = {"ratio": [[10.0, 0.0], [5.0, 10.0]], "offset": [0.0, 0.0], "torque_constant": [1.0, 1.0]}
+    coupled = SimpleNamespace(**{**vars(model), "DRIVES": drives, "regressor": regressor})
+    keep = {"filtered_states": filtered, "factor": factored}
+    for place in ("runtime.observation.states.filtered_states", "runtime.observation.system.factor"):
+        calls, real = keep[place.rpartition(".")[2]], pydoc.locate(place)
+        monkeypatch.setattr(place, lambda *given, calls=calls, real=real: calls.append(given) or real(*given))
+    study = study_from_mapping({"record": {"files": "run.npz", "side": "motor"}, "signals": {"lowpass": {"cutoff": 20}}})
+    result = runtime.identify(coupled, positions, study)
+    N = len(positions)
+    assert set(result.coupling) == {"both", "position", "torque", "none"} and result.coupling["both"] is result.estimate
+    assert sum(count for count in evaluated if count > 64) == 2 * N and len(filtered) == 2  # 64 states tell equal entries apart
+    W = result.observation.W
+    assert [Y is result.observation.Y for of, Y, *_ in factored if of is W] == [True, False]  # and the torques of the coupling `position`
+    assert sum(len(of) == len(W) for of, *_ in factored) == 4  # one for each coupling
 
 
 def test_records_and_streams_are_fitted_together(model):
