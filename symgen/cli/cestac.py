@@ -96,9 +96,8 @@ def cestac(
                     )
                     text, negative = f"{advice.to_table()}\n\n{advice.verdict}", advice.negative
                 else:
-                    simulator = session.simulator_of(robot, model, study, needed=study.cestac.place == "loop")
                     where: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint}
-                    result = resolution = runtime.cestac(model, records, study, simulator=simulator, progress=progress, **where)
+                    result = resolution = runtime.cestac(model, records, study, progress=progress, **where)
                     text, negative = resolution_text(resolution), resolution.verdict == "biased"
         except KeyboardInterrupt:
             session.stopped(checkpoint)

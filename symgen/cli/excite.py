@@ -49,8 +49,7 @@ def excite(
         study = session.changed(study, "excitation", **given)
         records = read_records(study.record, model)
         with session.progress_bar("starts") as progress:
-            symbolic = session.symbolic_path(robot, model)
-            result = runtime.excite(model, records, study, symbolic=symbolic, workers=workers, progress=progress)
+            result = runtime.excite(model, records, study, workers=workers, progress=progress)
         if results is not None:
             runtime.report(result, results)
         session.show(json_text(result.summary()) if json else result.to_table(), output, json=json)

@@ -17,7 +17,6 @@ from symgen.cli.session import (
     progress_lines,
     reported_errors,
     show,
-    simulator_of,
     single_thread,
     study_of_arguments,
     variants_of,
@@ -60,12 +59,10 @@ def identify(
         study = study if block is None else replace(study, stream=block)
         records = records_or_streams(study.record, model, study.stream)
         computed = {"target": target_of(model), "processor": processor()}
-        simulator = simulator_of(robot, model, study)
         result = runtime.identify(
             model,
             records,
             study,
-            simulator=simulator,
             physical=physical,
             friction=friction,
             variants=variants_of(robot) if plausible else None,

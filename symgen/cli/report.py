@@ -41,10 +41,7 @@ def report(
         study = session.changed(session.study_of_arguments(record), "cestac", side=side)
         steps = () if encoder is None else session.changed(study, "cestac", delta=encoder).cestac.delta
         records = records_or_streams(study.record, model, study.stream)
-        simulator = session.simulator_of(robot, model, study)
-        result = assess(
-            model, records, study, encoder=steps, simulator=simulator, variants=session.variants_of(robot), progress=session.say
-        )
+        result = assess(model, records, study, encoder=steps, variants=session.variants_of(robot), progress=session.say)
         runtime.report(result, results)
         checklist = result.checklist
         typer.echo(json_text(checklist.summary()) if json else checklist.to_text(), nl=not json)

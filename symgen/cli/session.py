@@ -14,7 +14,6 @@ import typer
 
 if TYPE_CHECKING:
     from runtime.model.generated import GeneratedModel
-    from runtime.motion.simulation import Simulator
     from runtime.resolution.checkpoint import Checkpoint
     from runtime.settings.study import Study
 
@@ -139,33 +138,6 @@ def _in_c(model: GeneratedModel, robot: str | None) -> GeneratedModel:
     for warning in caught:
         typer.echo(str(warning.message), err=True)
     return compiled
-
-
-def symbolic_path(robot: str, model: GeneratedModel) -> Path:
-    """The CasADi module of a ROBOT argument: beside a generated module, else emitted."""
-    from runtime.errors import ModelError
-
-    file = Path(str(getattr(model, "__file__", "")))
-    if Path(robot).suffix == ".py":
-        return file.with_name(f"{file.stem}_casadi.py")
-    import symgen
-
-    try:
-        return Path(str(symgen.model(robot, target="casadi").__file__))
-    except symgen.SymgenError as e:
-        raise ModelError(f"{model.NAME} has joints that only its closure equations tie; there is no CasADi model of it") from e
-
-
-def simulator_of(robot: str, model: GeneratedModel, study: Study, *, needed: bool = False) -> Simulator | None:
-    """The closed loop of the study where its method simulates one, or where it is `needed`; else None."""
-    from runtime.estimators.methods import CLOSED_LOOP
-
-    if not (needed or study.estimate.method in CLOSED_LOOP) or study.controller is None:
-        return None
-    from runtime.model.casadi import load_symbolic
-    from runtime.motion.simulation import Simulator
-
-    return Simulator(model, study.controller, symbolic=load_symbolic(symbolic_path(robot, model), of=model))
 
 
 def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Study:

@@ -29,14 +29,12 @@ def simulate(
     with reported_errors(), reserved(output) as results:
         import runtime
         from runtime.json_documents import json_text
-        from runtime.model.casadi import load_symbolic
 
         model = session.model_of(robot)
         settings = session.study_of_arguments([study], recorded=False)
         if settings.controller is None:
             fail(f"{study} has no section `controller`; it says law, rate and reference of the closed loop")
-        symbolic = load_symbolic(session.symbolic_path(robot, model), of=model)
-        result = runtime.simulate(model, settings, symbolic=symbolic, ideal=ideal)
+        result = runtime.simulate(model, settings, ideal=ideal)
         if results is not None:
             runtime.report(result, results, study=settings)
         typer.echo(json_text(result.summary()) if json else result.to_table(), nl=not json)
