@@ -26,7 +26,7 @@ from runtime.identification.payload_study import payload_study
 from runtime.identification.plausibility.plausibility import plausibility
 from runtime.identification.result import Identification
 from runtime.identification.uncertainty import uncertainty
-from runtime.identification.validation import CrossValidation, direct_comparison, sets_validation, split_sets, weak_directions
+from runtime.identification.validation import CrossValidation, cross_validation, direct_comparison, split_validation, weak_directions
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import physical_model
 from runtime.observation.system import halves
@@ -119,7 +119,7 @@ def identify(
     if ended:
         at("validation")
         try:
-            validation = [split_sets(observation, windows, how, model=model)]
+            validation = [split_validation(observation, windows, how, model=model)]
         except InputError as e:
             missing = [*missing, f"validation between windows of the record: {e}"]
     else:
@@ -127,7 +127,7 @@ def identify(
     parts = {name: observed([record], windows=()) for name, record in zip(others, further, strict=True)}
     if parts and ended:
         known = sets or {"all": fit}
-        validation.append(sets_validation(observation, parts, how, name=fitted, model=model, fitted=known))
+        validation.append(cross_validation(observation, parts, how, name=fitted, model=model, fitted=known))
     missing += [text for part in validation for text in part.missing]
     best = best_set(validation[-1].errors() if validation and sets else {})
     if best == "feasible" and sets:

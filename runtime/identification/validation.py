@@ -10,7 +10,7 @@ Errors are reported per joint since a wrong wrist hides in a total that the shou
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -172,13 +172,13 @@ def prediction_errors(observation: Observation, fit: Estimate) -> tuple[float, t
 def cross_validation(
     fit: Observation,
     predict: Mapping[str, Observation],
-    settings: EstimateSettings | None = None,
+    choices: Mapping[Any, EstimateSettings],
     *,
-    essential: Sequence[str] | None = None,
     name: str = "fit",
     model: GeneratedModel | None = None,
+    fitted: Mapping[Any, Estimate] | None = None,
 ) -> CrossValidation:
-    """Fit on one observation, predict others, with all columns and with the essential ones.
+    """Fit every set of columns on one observation, predict others; a set whose fit fails is left out and told.
 
     Parameters
     ----------
@@ -186,32 +186,14 @@ def cross_validation(
         Rows that give the parameters.
     predict : mapping of str to Observation
         Other rows, by label.
-    settings : EstimateSettings, optional
-        Method; default: ols.
-    essential : sequence of str, optional
-        Names of the essential parameters.
+    choices : mapping of str to EstimateSettings
+        Method and columns of every set, by its name.
     name : str
         Label of `fit`.
     model : GeneratedModel, optional
         For methods that need it.
-    """
-    settings = settings or EstimateSettings()
-    choices = {"all": settings} | ({} if essential is None else {"essential": replace(settings, columns=tuple(essential))})
-    return sets_validation(fit, predict, choices, name=name, model=model)
-
-
-def sets_validation(
-    fit: Observation,
-    predict: Mapping[str, Observation],
-    choices: Mapping[Any, EstimateSettings],
-    *,
-    name: str = "fit",
-    model: GeneratedModel | None = None,
-    fitted: Mapping[Any, Estimate] | None = None,
-) -> CrossValidation:
-    """Fit every set of `choices` on one observation, predict others; a set whose fit fails is left out and told.
-
-    fitted : estimates of `fit` that exist already, by set.
+    fitted : mapping of str to Estimate
+        Estimates of `fit` that exist already, by set.
     """
     predictions = []
     missing: list[str] = []
@@ -231,30 +213,16 @@ def sets_validation(
 
 
 def split_validation(
-    observation: Observation,
-    windows: Sequence[Window],
-    settings: EstimateSettings | None = None,
-    *,
-    essential: Sequence[str] | None = None,
-    model: GeneratedModel | None = None,
-) -> CrossValidation:
-    """Cross-validation between windows in s of one record: the first is fitted, the others are predicted."""
-    settings = settings or EstimateSettings()
-    choices = {"all": settings} | ({} if essential is None else {"essential": replace(settings, columns=tuple(essential))})
-    return split_sets(observation, windows, choices, model=model)
-
-
-def split_sets(
     observation: Observation, windows: Sequence[Window], choices: Mapping[Any, EstimateSettings], *, model: GeneratedModel | None = None
 ) -> CrossValidation:
-    """`sets_validation` between windows in s of one record: the first is fitted, the others are predicted."""
+    """`cross_validation` between windows in s of one record: the first is fitted, the others are predicted."""
     if len(windows) < 2:
         raise InputError(f"{len(windows)} window; expected at least two, the first to fit, the others to predict (validate.split)")
     labels = [f"[{'' if t0 is None else f'{t0:g}'}, {'' if t1 is None else f'{t1:g}'}] s" for t0, t1 in windows]
     parts = {label: observation.between(t0, t1) for label, (t0, t1) in zip(labels, windows, strict=True)}
     first = labels[0]
     others = {label: part for label, part in parts.items() if label != first}
-    return sets_validation(parts[first], others, choices, name=first, model=model)
+    return cross_validation(parts[first], others, choices, name=first, model=model)
 
 
 @dataclass(frozen=True)

@@ -152,6 +152,19 @@ class Cestac:
         return max((result.verdict for result in self.levels), key=get_args(Verdict).index, default="unbiased")
 
     @property
+    def finer_for_values(self) -> str:
+        """Why single values ask for a finer step than the residual does, a sentence after a blank; "" where they do not."""
+        apart = (level for level in self.levels if level.residual_verdict == "unbiased" and level.verdict != "unbiased")
+        errors = {} if (level := next(apart, None)) is None else {name: e for name, e in level.decided_by.items() if name in self.names}
+        if level is None or not errors:
+            return ""
+        name = max(errors, key=errors.__getitem__)
+        return (
+            f" Single values ask for a finer one: at {level.level.label} {name} changes by {errors[name]:.0f} % and the residual grows by "
+            f"{level.increase:.1f} % of the torques, which hardly tell {name}."
+        )
+
+    @property
     def estimator(self) -> str:
         """Name of the method in tables: LS for least squares, whatever its weights."""
         return "LS" if self.reference.method in LINEAR else self.reference.method.upper()

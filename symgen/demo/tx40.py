@@ -107,19 +107,7 @@ class Demonstration:
         return (
             f"{'SIMULATED record: ' if self.simulated else ''}{len(names)} of {len(result.estimate.names)} parameters leave "
             f"{result.essential.estimate.relative_error:.1f} % of the torques of {result.model.NAME} unexplained, {result.prediction_error:.1f} % on a half "
-            f"of the record that the fit has not seen. As to the torques (residual of least squares), {steps}.{self.single} {self.physical}"
-        )
-
-    @property
-    def single(self) -> str:
-        """Why single parameters ask for a finer encoder than the torques do, a sentence; "" where they do not."""
-        apart = (level for level in self.resolution.levels if level.residual_verdict == "unbiased" and level.verdict != "unbiased")
-        if (level := next(apart, None)) is None:
-            return ""
-        name, error = max(((n, e) for n, e in level.decided_by.items() if n in self.resolution.names), key=lambda item: item[1])
-        return (
-            f" Single values ask for a finer one: at {level.level.label} {name} changes by {error:.0f} %, "
-            f"and the residual grows by {level.increase:.1f} % of the torques, which hardly tell {name}."
+            f"of the record that the fit has not seen. As to the torques (residual of least squares), {steps}.{self.resolution.finer_for_values} {self.physical}"
         )
 
     @property

@@ -85,7 +85,9 @@ def test_weights_sharpen_the_wrist(observation, study, model, found):
 
 
 def test_essential_parameters_predict_better(observation, study, found):
-    result = split_validation(observation, study.validate.split, essential=found.names)
+    result = split_validation(
+        observation, study.validate.split, {"all": EstimateSettings(), "essential": EstimateSettings(columns=found.names)}
+    )
     error = {(p.columns, p.fitted): p.relative_error for p in result.predictions}
     assert error["all", True] < error["essential", True]
     assert error["essential", False] < error["all", False] - 1  # 8.5 against 9.9 %

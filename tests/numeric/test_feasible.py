@@ -369,7 +369,9 @@ def test_tx40_record(tx40, tx40_data) -> None:
         torque = oracle.torque(q, qd, qdd, chi)
         np.testing.assert_allclose(tx40.inverse_dynamics(q, qd, qdd, found.X), torque, atol=1e-9 * np.abs(torque).max())
     for split in (study.validate.split, study.validate.split[::-1]):  # each half predicts the other better than by least squares
-        errors = [split_validation(seen, split, how, model=tx40).predictions[1].relative_error for how in (EstimateSettings(), FEASIBLE)]
+        errors = [
+            split_validation(seen, split, {"all": how}, model=tx40).predictions[1].relative_error for how in (EstimateSettings(), FEASIBLE)
+        ]
         assert errors[1] < 0.98 * errors[0]
     system = least_squares(seen, FEASIBLE, {})
     assert residual_norm(system.weighted, found.X) == pytest.approx(found.residual_norm, rel=1e-9)

@@ -224,7 +224,8 @@ def test_identification_of_the_tx40_by_blocks(tx40, block):
     same(found.all_parameters, expected.all_parameters)
     same(found.estimate, expected.estimate)
     assert [step.name for step in found.trail] == [step.name for step in expected.trail] and found.counts == expected.counts
-    validations = [split_validation(x, study.validate.split, study.estimate, essential=expected.names) for x in (whole, reduction)]
+    choices = {"all": study.estimate, "essential": replace(study.estimate, columns=expected.names)}
+    validations = [split_validation(x, study.validate.split, choices) for x in (whole, reduction)]
     for one, other in zip(*(v.predictions for v in validations), strict=True):
         assert (one.part, one.columns, one.fitted) == (other.part, other.columns, other.fitted)
         np.testing.assert_allclose((one.relative_error, *one.per_joint), (other.relative_error, *other.per_joint), rtol=1e-8)
@@ -267,7 +268,7 @@ def test_several_records_by_blocks(tx40):
     same(*(estimate_of(x, study.estimate, model=model) for x in (reduction, whole)))
     assert reduction.reduced.windows == halves(float(whole.t.min()), float(whole.t.max())) or study.validate.split
     one, other = (
-        cross_validation(x, {"first": y}, study.estimate).predictions[1]
+        cross_validation(x, {"first": y}, {"all": study.estimate}).predictions[1]
         for x, y in ((whole, observe(model, parts[0], study)), (reduction, by_blocks(model, [RecordStream(parts[0], 3000)], study)))
     )
     np.testing.assert_allclose((one.relative_error, *one.per_joint), (other.relative_error, *other.per_joint), rtol=1e-8)

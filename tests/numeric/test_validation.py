@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import planar_2r_model as planar
 import pytest
-from planar_data import TRUE, motion, observation
+from planar_data import OLS, TRUE, motion, observation
 
 from runtime.errors import InputError
 from runtime.estimators.methods import estimate_of
@@ -39,7 +39,9 @@ def test_comparison_uses_the_columns_of_the_estimate():
 def test_other_records_are_predicted():
     fit = observation(noise=(0.3, 0.05), seed=1)
     other = observation(noise=(0.3, 0.05), seed=2, motion=lambda t: motion(1.3 * t + 5))
-    result = cross_validation(fit, {"second": other}, essential=("MX1R", "FV1", "FS1", "MX2", "FV2", "FS2", "ZZ1R"))
+    result = cross_validation(
+        fit, {"second": other}, {"all": OLS, "essential": replace(OLS, columns=("MX1R", "FV1", "FS1", "MX2", "FV2", "FS2", "ZZ1R"))}
+    )
     assert [(p.part, p.columns, p.count, p.fitted) for p in result.predictions] == [
         ("fit", "all", 10, True),
         ("second", "all", 10, False),
@@ -56,13 +58,13 @@ def test_other_records_are_predicted():
 
 def test_windows_of_one_record():
     seen = observation(noise=(0.3, 0.05), seed=1)
-    result = split_validation(seen, [(0, 5), (5.01, None)])
+    result = split_validation(seen, [(0, 5), (5.01, None)], {"all": OLS})
     assert [p.part for p in result.predictions] == ["[0, 5] s", "[5.01, ] s"]
     found = estimate_of(seen.between(0, 5))
     late = seen.between(5.01, None)
     assert np.isclose(result.predictions[1].relative_error, 100 * np.linalg.norm(late.Y - late.W @ found.X) / np.linalg.norm(late.Y))
     with pytest.raises(InputError, match="at least two"):
-        split_validation(seen, [(0, 5)])
+        split_validation(seen, [(0, 5)], {"all": OLS})
 
 
 def test_parameters_that_trade_are_named():
