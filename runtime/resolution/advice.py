@@ -124,11 +124,14 @@ class ReaderAdvice:
     encoders : tuple of EncoderAdvice
         All together first, then one at a time.
     notes : tuple of str
+    steps : ndarray, shape (len(asked), b), %
+        Change at the steps asked for, of all encoders; nan where the records do not tell.
     """
 
     reader: str
     encoders: tuple[EncoderAdvice, ...]
     notes: tuple[str, ...] = ()
+    steps: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +149,7 @@ class Advice:
     asked : tuple of float, rad or m
         Further steps, of all encoders.
     steps : ndarray, shape (len(asked), b), %
-        Change predicted there.
+        Change predicted there by the chapter's law; under law phase, of real encoders read as the study reads them, nan where the records do not tell.
     torque_sigma : ndarray, shape (b,)
         Deviation of the parameters per N m (N) of deviation of the motor torques.
     real : tuple of ReaderAdvice
@@ -181,10 +184,10 @@ class Advice:
         """Where the encoders stand."""
         return {"joint": "at the joints", "motor": "at the motors"}[self.settings.get("cestac", {}).get("side", "joint")]
 
-    def worst(self, step: int) -> tuple[str, float]:
-        """The parameter that matters most at the step asked for, and its %e."""
+    def worst(self, step: int, steps: Array | None = None) -> tuple[str, float]:
+        """The parameter that matters most at the step asked for, and its %e. steps : changes; default: those of the advice."""
         decisive = [self.names.index(name) for name in self.deciding]
-        e = np.abs(self.steps[step])[decisive]
+        e = np.abs((self.steps if steps is None else steps)[step])[decisive]
         k = int(np.argmax(e)) if len(e) else 0
         return (self.names[decisive[k]], float(e[k])) if len(e) else ("", 0.0)
 
@@ -305,9 +308,14 @@ class Advice:
     def asked_lines(self) -> list[str]:
         """One line per step asked for."""
         lines = []
+        ways = [(f", read as {NAMES[reader.reader]}", reader.steps) for reader in self.real]
+        if not self.real or self.encoders is not self.real[0].encoders:
+            ways.insert(0, ("", self.steps))
         for k, delta in enumerate(self.asked):
-            name, e = self.worst(k)
-            lines.append(f"Delta = {Level(delta).label}: largest predicted change {e:.2f} % ({name})")
+            for way, steps in ways:
+                name, e = self.worst(k, steps)
+                change = "not judged on this record" if np.isnan(e) else f"largest predicted change {e:.2f} % ({name})"
+                lines.append(f"Delta = {Level(delta).label}{way}: {change}")
         return ["\n".join(lines)] if lines else []
 
     def to_json(self) -> str:

@@ -174,7 +174,13 @@ def advise(
     if real or law == "phase":
         rate = np.abs(Predictor(parts, predictor.weights, VARIANCE["phase"]).rate(every)[decisive]).max(initial=0.0)
         start = float(np.sqrt(LIMITS[0] / rate)) if np.isfinite(rate) and rate > 0 else np.inf
-        given: dict[str, Any] = {"drives": drives, "constants": dict(constants or {}), "confirm": confirm, "progress": advance}
+        given: dict[str, Any] = {
+            "drives": drives,
+            "constants": dict(constants or {}),
+            "confirm": confirm,
+            "progress": advance,
+            "asked": asked,
+        }
         by_reader = real_encoders(model, records, study, reference, selections, units, start, **given)
     advices = []
     for label, own in selections.items() if law != "phase" else ():
@@ -184,13 +190,16 @@ def advise(
             advice = confirmed(advice, reference, partial(sampled_level, task, parts, reference, own))
         advices.append(advice)
         advance()
+    steps = np.array([predictor.change(delta, every) for delta in asked]).reshape(len(asked), len(names))
+    if law == "phase":
+        steps = next(reader.steps for reader in by_reader if reader.reader == study.signals.reader)
     return Advice(
         names=names,
         reference=reference,
         encoders=tuple(advices) if advices else by_reader[0].encoders,
         real=by_reader,
         asked=tuple(asked),
-        steps=np.array([predictor.change(delta, every) for delta in asked]).reshape(len(asked), len(names)),
+        steps=steps,
         torque_sigma=torque_sigma(predictor, drives),
         assumptions=assumptions(study, records, parts, reference, real=bool(by_reader)),
         settings={
@@ -317,8 +326,9 @@ def assumptions(
         encoders.append(
             f"Real encoders: counts of steps Delta, lines {lines}, the phase random by encoder and run, {place}. The reader knows the step, not the phase. "
             f"Curves are a quadrature over the phase, without first order; steps of fewer than {LINES} in the motion of a joint are not judged. "
-            "Both estimates stand on the rows that the reader leaves in; rows in which dry friction has no certain direction are not among them. Between "
-            f"the steps tried, in the ratio {STEPS:g}, a joint of constant speed may lock to the sampling and change more: ask for the step of the encoder itself."
+            "Both estimates stand on the rows that the reader leaves in; rows in which dry friction has no certain direction are not among them. Steps are "
+            f"tried in the ratio {STEPS:g}, read as positions more closely where constant speeds of the record lock to the sampling and change more; between "
+            "these, ask for the step of the encoder itself."
         )
     return (
         *encoders,

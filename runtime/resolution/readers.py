@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -30,7 +31,19 @@ from runtime.observation.filters import SpeedErrors, States, filtered_states
 from runtime.observation.observation import Observation, Selection, observation_from_states, stack
 from runtime.observation.states import certain_rows, encoder_root, joint_states
 from runtime.records.record import Record
-from runtime.resolution.advice import LIMITS, EncoderAdvice, Limit, ReaderAdvice, Sampled, confirmed, crossing, sampled
+from runtime.resolution.advice import (
+    AGREED,
+    LIMITS,
+    NAMES,
+    EncoderAdvice,
+    Limit,
+    ReaderAdvice,
+    Sampled,
+    confirmed,
+    crossing,
+    sampled,
+    step_text,
+)
 from runtime.resolution.own_encoder import FINER
 from runtime.resolution.perturbed import PreparedRecord, prepared
 from runtime.resolution.result import deciding_names
@@ -44,8 +57,12 @@ Reader = Literal["lowpass", "counts"]
 READERS: tuple[Reader, ...] = ("lowpass", "counts")
 PHASES: Mapping[Reader, int] = {"lowpass": 8, "counts": 4}  # nodes of the quadrature over the phase
 RATIO = 1.5  # of neighbouring steps
+FINER_STEPS, LOCKED = 10, 1.5  # steps put between two neighbours, where the sawtooth passes the filters by so much more than at both
+FLAT = 3.0  # of steps about a limit, between which the change agrees with it, from which the advice says so
+HARMONICS = 12  # of the sawtooth
 DOWN, UP = 8, 16  # most steps below and above the first
 LINES = 8  # fewest steps of an encoder in its motion
+LOOKED_AT = 4000  # samples of a record whose speeds are compared with its steps
 QUADRATURE = 1 << 20  # number of the first stream of the nodes: beyond those of runs
 
 
@@ -99,6 +116,39 @@ class RealEncoders:
         """Largest step of each encoder, shape (n,): LINES of them in its motion; inf of one at rest."""
         spans = np.min([np.ptp(part.x, axis=0) for part in self.parts], axis=0)
         return np.where(spans > 0, spans / LINES, np.inf)
+
+    @property
+    def finest(self) -> float:
+        """Smallest step beside which the positions of the records count as exact, rad or m."""
+        return FINER * max((float(part.record.own.step.max()) for part in self.parts if part.record.own is not None), default=0.0)
+
+    def asked(self, delta: float) -> Array:
+        """Mean change with all encoders that move of this step, shape (b,), %; nan where the records do not tell."""
+        moving = [i for i, most in enumerate(self.coarsest) if np.isfinite(most)]
+        if self.finest * (1 - 1e-9) <= delta <= self.coarsest.min():
+            try:
+                return self.change(self.nodes(delta, moving), moving)
+            except np.linalg.LinAlgError:  # a step that this reader does not resolve
+                pass
+        return np.full(len(self.names), np.nan)
+
+    def locking(self, delta: Array) -> Array:
+        """Power of the sawtooth that passes the low-pass, over that of white noise, the largest of the encoders, shape (m,); delta, shape (m,).
+
+        Harmonic h of the error of a count has the frequency h |qd|/Delta and a power as 1/h^2; sampled, it is as slow as its distance from a multiple of
+        the rate. Where a joint keeps a speed that is a simple fraction of a step per sample, the error stands still.
+        """
+        h = np.arange(1, HARMONICS + 1)
+        weight, most = 1 / h**2 / np.sum(1 / h**2), np.zeros(len(delta))
+        for part in self.parts:
+            rate, low = part.record.rate, part.record.selection.signals.lowpass
+            band = 1.0 if low is None else 2 * low.cutoff / rate
+            speed = np.abs(part.states.qd[:: max(1, len(part.x) // LOOKED_AT)] @ np.linalg.inv(part.root).T) / rate  # per sample
+            for k, step in enumerate(delta):
+                turns = h[:, None, None] * speed / step
+                passed = (np.abs(turns - np.round(turns)) < band / 2).mean(axis=1)
+                most[k] = max(most[k], float((weight @ passed).max()) / band)
+        return most
 
     def nodes(self, delta: float, moving: Sequence[int]) -> list[list[Errors]]:
         """Errors of every record at the nodes of the quadrature, the encoders `moving` coarse."""
@@ -176,6 +226,7 @@ def real_encoders(
     units: Sequence[str],
     start: float,
     *,
+    asked: Sequence[float] = (),
     drives: Drives | None,
     constants: Mapping[str, float],
     confirm: bool = True,
@@ -184,34 +235,35 @@ def real_encoders(
     """Advice on real encoders read as positions, then as counts.
 
     reference : estimate of the records as measured, whose deciding parameters decide here.   selections : encoders (from 0) by label.   units : of
-    each encoder.   start : rad or m, a step about which the walk begins.   progress : called after each choice of encoders.
+    each encoder.   start : rad or m, a step about which the walk begins.   asked : further steps, of all encoders.   progress : called after each choice of encoders.
     """
     advices = []
     for reader in READERS:
         real = RealEncoders(model, records, study, reference.names, drives, constants, reader)
-        curves = _curves(real, selections, start, [reference.names.index(name) for name in deciding_names(reference)])
+        by_label = curves(real, selections, start, [reference.names.index(name) for name in deciding_names(reference)])
         encoders = []
         for label, own in selections.items():
             unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
-            advice = _advice(label, *curves[label], reference, unit)
+            advice = _advice(label, *by_label[label], reference, unit)
             if confirm:
                 advice = confirmed(advice, reference, lambda delta, own=own, real=real: real.sampled(own, delta))  # type: ignore[misc]
             encoders.append(advice)
             progress()
-        advices.append(ReaderAdvice(reader, tuple(encoders), tuple(part.record.note for part in real.parts if part.record.note)))
+        notes = [part.record.note for part in real.parts if part.record.note]
+        steps = np.array([real.asked(delta) for delta in asked]).reshape(len(asked), len(real.names))
+        advices.append(ReaderAdvice(reader, tuple(encoders), (*notes, *flat(reader, encoders[0], reference.names)), steps))
     return tuple(advices)
 
 
-def _curves(
+def curves(
     real: RealEncoders, selections: Mapping[str, tuple[int, ...]], start: float, decisive: Sequence[int]
 ) -> dict[str, tuple[Array, Array]]:
-    """Steps and changes by label: from `start` down until all is below the first limit, up until all is above the last."""
-    known: dict[str, dict[int, Array]] = {label: {} for label in selections}
-    finest = FINER * max((part.record.own.step.max() for part in real.parts if part.record.own is not None), default=0.0)
-    coarsest = real.coarsest
+    """Steps and changes by label: from `start` down until all is below the first limit, up until all is above the last; finer where steps lock."""
+    known: dict[str, dict[float, Array]] = {label: {} for label in selections}
+    finest, coarsest = real.finest, real.coarsest
     start = min(max(start, finest), float(coarsest.min()))
 
-    def evaluate(k: int) -> dict[str, float]:
+    def evaluate(k: float) -> dict[str, float]:
         delta = start * RATIO**k
         moving = [i for i, most in enumerate(coarsest) if delta <= most < np.inf]
         asked = {label: own for label, own in selections.items() if set(own) <= {*moving, *np.flatnonzero(np.isinf(coarsest))}}
@@ -230,6 +282,13 @@ def _curves(
             worst = evaluate(step * k)
             if not worst or (max(worst.values()) < limit if step < 0 else min(worst.values()) > limit):
                 break
+    tried = sorted({k for own in known.values() for k in own})
+    for a, b in pairwise(tried) if real.reader == "lowpass" else ():
+        between = np.linspace(a, b, FINER_STEPS + 1)
+        share = real.locking(start * RATIO**between)
+        if share[1:-1].max() > LOCKED * max(share[0], share[-1]):
+            for k in between[1:-1].tolist():
+                evaluate(k)
     order = {label: sorted(own) for label, own in known.items()}
     b = len(real.names)
     return {
@@ -257,6 +316,25 @@ def _advice(label: str, delta: Array, change: Array, reference: Estimate, unit: 
         else:
             limits.append(Limit(percent, np.inf, ""))
     return EncoderAdvice(label, tuple(limits), delta, change, unit=unit)
+
+
+def flat(reader: Reader, advice: EncoderAdvice, names: Sequence[str]) -> list[str]:
+    """Sentences on the limits about which the change hardly depends on the step, so that the step means little."""
+    found = []
+    for limit in advice.limits:
+        if not np.isfinite(limit.delta):
+            continue
+        e = np.abs(advice.change[:, names.index(limit.parameter)])
+        low, high = limit.percent / (1 + AGREED), limit.percent * (1 + AGREED)
+        below, above = advice.delta[e < low], advice.delta[(e > high) & (advice.delta > limit.delta)]
+        first = max(below[below < limit.delta], default=float(advice.delta[0]))
+        last = min(above, default=float(advice.delta[-1]))
+        if last > FLAT * first:
+            found.append(
+                f"Read as {NAMES[reader]}, {limit.parameter} changes by {low:.2g} to {high:.2g} % from {step_text(first, advice.unit)} to "
+                f"{step_text(last, advice.unit)}: the step of {limit.percent:g} % is no sharper than that; ask for the step of the encoder itself."
+            )
+    return found
 
 
 def _three(states: States) -> tuple[Array, Array, Array]:

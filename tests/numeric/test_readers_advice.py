@@ -7,10 +7,11 @@ import pytest
 from campaign import campaign
 from test_cestac_counts import RECORD, SIGNALS, STEP, planar
 
+from runtime.observation.filters import filtered_states
 from runtime.reporting.resolution_advice import advice_section
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
-from runtime.resolution.readers import RealEncoders
+from runtime.resolution.readers import RATIO, RealEncoders, curves
 from runtime.settings.study import CestacSettings, Rows, Study
 
 NAMES = ("ZZ1R", "ZZ2", "FV1")
@@ -23,20 +24,22 @@ STUDY = Study(
 
 @pytest.fixture(scope="module")
 def advice():
-    return advise(planar, RECORD, STUDY, encoders=("all", "2"))
+    return advise(planar, RECORD, STUDY, encoders=("all", "2"), asked=(STEP, 10.0))
 
 
 def test_quadrature_over_the_phase_is_the_mean_of_cestac():
     """Against 60 runs of CESTAC, three deviations of their mean, 20 % (10 % of Delta) and 0.3; for one encoder of two alike."""
     found = cestac(planar, RECORD, replace(STUDY, cestac=replace(STUDY.cestac, runs=60)))
     real = RealEncoders(planar, [RECORD], STUDY, NAMES, None, {}, "lowpass")
-    nodes = real.nodes(STEP, (0, 1))
+    change = real.asked(STEP)
     level = found.levels[0]
     sampled = 100 * (level.mean / found.reference.X - 1)
     assert np.allclose(real.reference, found.reference.X, rtol=1e-9)
-    assert np.all(np.abs(real.change(nodes, (0, 1)) - sampled) < 3 * level.half_width_percent / 2 + 0.2 * np.abs(sampled) + 0.3)
+    assert np.all(np.abs(change - sampled) < 3 * level.half_width_percent / 2 + 0.2 * np.abs(sampled) + 0.3)
     alone = real.sampled((1,), STEP, 40)
-    assert np.all(np.abs(real.change(nodes, (1,)) - alone.change) < 3 * alone.half_width / 2 + 0.2 * np.abs(alone.change) + 0.3)
+    assert np.all(
+        np.abs(real.change(real.nodes(STEP, (0, 1)), (1,)) - alone.change) < 3 * alone.half_width / 2 + 0.2 * np.abs(alone.change) + 0.3
+    )
 
 
 @campaign
@@ -57,6 +60,30 @@ def test_side_by_side_in_words(advice):
     assert "Real encoders read as counts: With every encoder alike" in advice.verdict
     assert set(advice_section(advice).tables[0].header) >= {"encoder", "positions, 5 %", "counts, 1 %"}
     assert '"real"' in advice.to_json()
+    delta = advice.encoders[0].delta
+    assert np.allclose(delta[1:] / delta[:-1], RATIO)  # nothing locks
+    name, e = advice.worst(0)
+    assert (
+        f"read as positions: largest predicted change {e:.2f} % ({name})" in text
+        and "10, read as counts: not judged on this record" in text
+    )
+
+
+def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
+    """Joint 1 to and fro at 2 rad/s: at 2 mrad a sample of 1 ms is one step, and the error of its counts stands still."""
+    triangle = np.abs((RECORD.t * 2 / 3) % 2 - 1) * 3
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(len(triangle))  # else its positions would lie on a lattice of 2 mrad themselves
+    q = np.column_stack([triangle + noise, RECORD.q[:, 1]])
+    states = filtered_states(q, RECORD.rate, STUDY.signals)
+    record = replace(RECORD, q=q, tau=planar.inverse_dynamics(states.q, states.qd, states.qdd, planar.base_parameters(planar.VALUES)))
+    real = RealEncoders(planar, [record], STUDY, NAMES, None, {}, "lowpass")
+    locked, free, half = real.locking(np.array([2e-3, 2.3e-3, 4e-3]))
+    assert locked > 5 * free and half > 2 * free
+    monkeypatch.setattr("runtime.resolution.readers.UP", 2)
+    delta, _ = curves(real, {"1": (0,)}, 1.7e-3, [0])["1"]
+    ratio = delta[1:] / delta[:-1]
+    near = (delta[1:] > 1.9e-3) & (delta[:-1] < 2.1e-3)
+    assert near.sum() >= 3 and ratio[near].max() < 1.05
 
 
 def test_a_record_that_is_coarse_itself_sets_the_finest_step():
