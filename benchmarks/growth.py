@@ -93,7 +93,7 @@ def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Cur
     """MB of `symgen identify`, with the whole record in memory and by blocks, beside what W would take."""
     found: Curves = {"whole record": [], "by blocks": [], "W alone (never formed)": []}
     for N in samples:
-        record = write_npz(model, N, folder)
+        record = write_npz(model, N, folder, "lowpass")
         found["whole record"].append((N, identified(record, "off")["bytes"] / 1e6))
         found["by blocks"].append((N, identified(record, BLOCK)["bytes"] / 1e6))
         found["W alone (never formed)"].append((N, 8 * 6 * len(model.BASE_PARAMETERS) * N / 1e6))
