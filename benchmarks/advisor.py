@@ -41,6 +41,7 @@ from runtime.resolution.cestac import cestac  # noqa: E402
 from runtime.resolution.perturbed import Task, prepared  # noqa: E402
 from runtime.resolution.readers import RealEncoders  # noqa: E402
 from runtime.settings.study import study_from_mapping  # noqa: E402
+from symgen.demo.counts import MAIN  # noqa: E402
 from symgen.demo.haptic_motion import haptic_record, haptic_study  # noqa: E402
 
 RUNS = {"emps": 100, "tx40": 60, "haptic": 30}
@@ -48,27 +49,6 @@ LEVELS = 8
 ROUNDS = 5
 RATIO = 1.3
 REAL_RUNS = 12
-MAIN = (
-    "ZZ1R",
-    "FV1",
-    "FS1",
-    "XX2R",
-    "ZZ2R",
-    "MX2R",
-    "FV2",
-    "FS2",
-    "MY3R",
-    "Ia3",
-    "FV3",
-    "FS3",
-    "Ia4",
-    "FV4",
-    "FS4",
-    "Ia5",
-    "FV5",
-    "FS5",
-    "FV6",
-)
 
 
 def opened(name, model, folder):
@@ -171,7 +151,8 @@ def real_table(name, model, study, record, names):
                     f"  {reader.reader:8} {limit.percent:g} %: {'none' if np.isnan(limit.delta) else 'every step'} ({limit.parameter}), {first.delta[0]:.3g} to {first.delta[-1]:.3g}"
                 )
                 continue
-            grid = limit.delta * RATIO ** np.arange(-2, 3.0)
+            near = first.delta[np.abs(np.log(first.delta / limit.delta)) < 2 * np.log(RATIO)]
+            grid = near if len(near) > 5 else limit.delta * RATIO ** np.arange(-2, 3.0)  # where steps lock, those of the curve
             e = np.abs([real.sampled(range(record.n), delta, REAL_RUNS).change for delta in grid])
             steps = {n: crossing(grid, e[:, names.index(n)], limit.percent) for n in advice.deciding}
             reached = first.reached(limit.percent)
@@ -179,7 +160,9 @@ def real_table(name, model, study, record, names):
             sampled = min((s for s in steps.values() if np.isfinite(s)), default=np.nan)
             which = min(steps, key=lambda n: steps[n] if np.isfinite(steps[n]) else np.inf)
             print(f"  {reader.reader:8} {limit.percent:g} %: predicted {limit.delta:.3e} ({limit.parameter}), sampled {sampled:.3e} ({which}), "
-                  f"ratio {limit.delta / sampled:.2f}; at the predicted step {limit.parameter} sampled {e[2][names.index(limit.parameter)]:.2f} %", flush=True)  # fmt: skip
+                  f"ratio {limit.delta / sampled:.2f}; {limit.parameter} sampled at the step nearest to the predicted one: "
+                  f"{e[np.argmin(np.abs(np.log(grid / limit.delta))), names.index(limit.parameter)]:.2f} %", flush=True)  # fmt: skip
+        print(*reader.notes, sep="\n")
         print(
             f"  {reader.reader:8} by parameter: {sum(abs(r - 1) <= 0.2 for r in ratios)} of {len(ratios)} predicted steps within 20 % of the sampled ones"
         )

@@ -58,7 +58,7 @@ READERS: tuple[Reader, ...] = ("lowpass", "counts")
 PHASES: Mapping[Reader, int] = {"lowpass": 8, "counts": 4}  # nodes of the quadrature over the phase
 RATIO = 1.5  # of neighbouring steps
 FINER_STEPS, LOCKED = 10, 1.5  # steps put between two neighbours, where the sawtooth passes the filters by so much more than at both
-FLAT = 3.0  # of steps about a limit, between which the change agrees with it, from which the advice says so
+UNCERTAIN = 2.0  # ratio of the steps between which a change cannot be told from a limit, from which the advice says so
 HARMONICS = 12  # of the sawtooth
 DOWN, UP = 8, 16  # most steps below and above the first
 LINES = 8  # fewest steps of an encoder in its motion
@@ -127,7 +127,7 @@ class RealEncoders:
         moving = [i for i, most in enumerate(self.coarsest) if np.isfinite(most)]
         if self.finest * (1 - 1e-9) <= delta <= self.coarsest.min():
             try:
-                return self.change(self.nodes(delta, moving), moving)
+                return np.asarray(self.change(self.nodes(delta, moving), moving)[0])
             except np.linalg.LinAlgError:  # a step that this reader does not resolve
                 pass
         return np.full(len(self.names), np.nan)
@@ -160,8 +160,9 @@ class RealEncoders:
                 for k, phases in enumerate(at)]  # fmt: skip
 
     def change(self, nodes: Sequence[Sequence[Errors]], encoders: Sequence[int]) -> Array:
-        """Mean change of the estimate, shape (b,), %, with these encoders coarse."""
-        return np.asarray(100 * (np.mean([self._ratio(errors, encoders) for errors in nodes], axis=0) - 1))
+        """Mean change of the estimate with these encoders coarse, and the deviation of that mean, shape (2, b), %."""
+        ratios = np.array([self._ratio(errors, encoders) for errors in nodes])
+        return 100 * np.array([ratios.mean(axis=0) - 1, ratios.std(axis=0, ddof=1) / np.sqrt(len(ratios))])
 
     def sampled(self, encoders: Sequence[int], delta: float, runs: int | None = None) -> Sampled:
         """CESTAC by law phase with these encoders coarse, eqs. (17), (18), (21)."""
@@ -244,14 +245,21 @@ def real_encoders(
         encoders = []
         for label, own in selections.items():
             unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
-            advice = _advice(label, *by_label[label], reference, unit)
+            advice = _advice(label, by_label[label][0], by_label[label][1][:, 0], reference, unit)
             if confirm:
                 advice = confirmed(advice, reference, lambda delta, own=own, real=real: real.sampled(own, delta))  # type: ignore[misc]
             encoders.append(advice)
             progress()
         notes = [part.record.note for part in real.parts if part.record.note]
         steps = np.array([real.asked(delta) for delta in asked]).reshape(len(asked), len(real.names))
-        advices.append(ReaderAdvice(reader, tuple(encoders), (*notes, *flat(reader, encoders[0], reference.names)), steps))
+        advices.append(
+            ReaderAdvice(
+                reader,
+                tuple(encoders),
+                (*notes, *uncertain(reader, encoders[0], by_label[encoders[0].label][1][:, 1], reference.names)),
+                steps,
+            )
+        )
     return tuple(advices)
 
 
@@ -275,7 +283,7 @@ def curves(
             return {}
         for label, own in asked.items():
             known[label][k] = real.change(nodes, own)
-        return {label: float(np.abs(known[label][k][decisive]).max(initial=0.0)) for label in asked}
+        return {label: float(np.abs(known[label][k][0, decisive]).max(initial=0.0)) for label in asked}
 
     for step, most, limit in ((-1, DOWN, LIMITS[0]), (1, UP, LIMITS[-1])):
         for k in range(0 if step < 0 else 1, most):
@@ -292,7 +300,7 @@ def curves(
     order = {label: sorted(own) for label, own in known.items()}
     b = len(real.names)
     return {
-        label: (start * RATIO ** np.array(ks, dtype=float), np.array([known[label][k] for k in ks]).reshape(len(ks), b))
+        label: (start * RATIO ** np.array(ks, dtype=float), np.array([known[label][k] for k in ks]).reshape(len(ks), 2, b))
         for label, ks in order.items()
     }
 
@@ -318,21 +326,20 @@ def _advice(label: str, delta: Array, change: Array, reference: Estimate, unit: 
     return EncoderAdvice(label, tuple(limits), delta, change, unit=unit)
 
 
-def flat(reader: Reader, advice: EncoderAdvice, names: Sequence[str]) -> list[str]:
-    """Sentences on the limits about which the change hardly depends on the step, so that the step means little."""
+def uncertain(reader: Reader, advice: EncoderAdvice, error: Array, names: Sequence[str]) -> list[str]:
+    """Sentences on the limits about which the change hardly depends on the step, or scatters as much; error : deviation of the change, shape (m, b), %."""
     found = []
     for limit in advice.limits:
         if not np.isfinite(limit.delta):
             continue
-        e = np.abs(advice.change[:, names.index(limit.parameter)])
-        low, high = limit.percent / (1 + AGREED), limit.percent * (1 + AGREED)
-        below, above = advice.delta[e < low], advice.delta[(e > high) & (advice.delta > limit.delta)]
-        first = max(below[below < limit.delta], default=float(advice.delta[0]))
-        last = min(above, default=float(advice.delta[-1]))
-        if last > FLAT * first:
+        i = names.index(limit.parameter)
+        e, apart = np.abs(advice.change[:, i]), np.maximum(AGREED * limit.percent, 2 * error[:, i])
+        first = advice.delta[(e < limit.percent - apart) & (advice.delta < limit.delta)].max(initial=advice.delta[0])
+        last = advice.delta[(e > limit.percent + apart) & (advice.delta > limit.delta)].min(initial=advice.delta[-1])
+        if last > UNCERTAIN * first:
             found.append(
-                f"Read as {NAMES[reader]}, {limit.parameter} changes by {low:.2g} to {high:.2g} % from {step_text(first, advice.unit)} to "
-                f"{step_text(last, advice.unit)}: the step of {limit.percent:g} % is no sharper than that; ask for the step of the encoder itself."
+                f"Read as {NAMES[reader]}, all encoders alike: from {step_text(first, advice.unit)} to {step_text(last, advice.unit)} the change of "
+                f"{limit.parameter} is {limit.percent:g} % as near as the prediction knows it; ask for the step of the encoder itself."
             )
     return found
 
