@@ -327,7 +327,10 @@ def direction(gravity: Gravity, named: Sequence[Trial]) -> Check:
 
 def better(problem: Problem, named: Sequence[Trial]) -> Check:
     """The alternatives that explain the record decisively better."""
-    question, limit = "Is the study the best explanation of the record?", f"no single change gains {DECISIVE:g} nats"
+    question, limit = (
+        "Is the study the best explanation of the record?",
+        f"no single change explains it decisively better ({DECISIVE:g} nats)",
+    )
     if not named:
         return Check(question, "good", "No single change of signs, columns, units, angles or lengths explains it better", limit)
     best = named[0]
