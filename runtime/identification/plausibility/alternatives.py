@@ -49,6 +49,8 @@ class Alternative:
         Factor on the sampling rate.
     constants : mapping of str to float
         Entries of the table of frames, SI.
+    of : str
+        The number that is changed, where other amounts of it are alternatives too.
     """
 
     cause: str
@@ -59,6 +61,12 @@ class Alternative:
     T: Array
     rate: float = 1.0
     constants: Mapping[str, float] = field(default_factory=dict)
+    of: str = ""
+
+    @property
+    def subject(self) -> str:
+        """What it changes, whatever the amount; the cause where it has no amount."""
+        return self.of or self.cause
 
     def states(self, samples: Samples) -> tuple[Array, Array, Array]:
         """q, qd, qdd, shape (K, n) each."""
@@ -72,6 +80,11 @@ class Alternative:
     def on_data(self) -> bool:
         """Whether the table of frames stays."""
         return not self.constants
+
+
+def unchanged(n: int, **changed: Any) -> Alternative:
+    """The study of n joints as it is, but for what is given."""
+    return Alternative(**{"cause": "", "remedy": "", "kind": "", "P": np.eye(n), "p": np.zeros(n), "T": np.eye(n)} | changed)
 
 
 def alternatives(
@@ -111,8 +124,7 @@ class _Maker:
             self.tau_of_motors = drives.ratio.T
 
     def __call__(self, kind: str, cause: str, remedy: str, **changed: Any) -> Alternative:
-        given = {"P": self.one, "p": np.zeros(self.n), "T": self.one} | changed
-        return Alternative(cause, remedy, kind, **given)
+        return unchanged(self.n, kind=kind, cause=cause, remedy=remedy, **changed)
 
     def positions(self, E: Array) -> dict[str, Array]:
         """The map E of the columns of positions: q' = R^-1 E R (q - offset) + offset on the side of motors."""
@@ -186,13 +198,19 @@ def units(make: _Maker) -> Iterator[Alternative]:
 def rates(make: _Maker) -> Iterator[Alternative]:
     """Another sampling rate, by the factors of RATES."""
     for factor in RATES:
-        text = f"{factor:g} times" if factor > 1 else f"1/{1 / factor:g} of"
         yield make(
             "rate",
-            f"the sampling rate is {text} the stated one",
+            f"the sampling rate is {times_of([factor])} the stated one",
             "correct record.rate, or the unit of the time column (record.units.t)",
             rate=factor,
+            of="the sampling rate",
         )
+
+
+def times_of(factors: Sequence[float]) -> str:
+    """Factors, in rising order, in words."""
+    words = [f"{factor:g}" if factor > 1 else f"1/{1 / factor:g}" for factor in factors]
+    return f"{', '.join(words[:-1])}{' or ' if len(words) > 1 else ''}{words[-1]} {'times' if factors[-1] > 1 else 'of'}"
 
 
 def couplings(make: _Maker) -> Iterator[Alternative]:
@@ -227,7 +245,7 @@ def zeros(make: _Maker) -> Iterator[Alternative]:
         for text, angle in TURNS.items():
             p = np.where(np.arange(make.n) == j, angle, 0.0)
             remedy = f"look at theta of the frame of joint {joint} and at its zero (drives.offset): {text} are missing"
-            yield make("zero", f"theta of joint {joint} is wrong by {text}", remedy, p=p)
+            yield make("zero", f"theta of joint {joint} is wrong by {text}", remedy, p=p, of=f"the zero of joint {joint}")
 
 
 def transmissions(make: _Maker, drives: Drives, sides: Sequence[str]) -> Iterator[Alternative]:
@@ -235,60 +253,38 @@ def transmissions(make: _Maker, drives: Drives, sides: Sequence[str]) -> Iterato
     R, constant, n = drives.ratio, np.diag(drives.torque_constant), make.n
     inverse = np.linalg.inv(R)
     shift = drives.offset
+    both = {"P": inverse, "p": shift, "T": R.T}, {"P": R, "p": -R @ shift, "T": inverse.T}
+    motors, joints = "set record.side: motor", "set record.side: joint"
     if not np.allclose(R, np.eye(n)):
-        yield make(
-            "side",
-            "torques of the motors are taken as torques of the joints: the gear ratio is missing",
-            "set record.torque_side: motor",
-            T=R.T,
-        )
-        yield make(
-            "side",
-            "torques of the joints are taken as torques of the motors: the gear ratio is applied twice",
-            "set record.torque_side: joint",
-            T=inverse.T,
-        )
-        yield make("side", "positions of the motors are taken as positions of the joints", "set record.side: motor", P=inverse, p=shift)
-        yield make(
-            "side",
-            "positions of the joints are taken as positions of the motors",
-            "set record.side: joint, torque_side: motor",
-            P=R,
-            p=-R @ shift,
-        )
-        yield make(
-            "side",
-            "positions and torques of the motors are taken as those of the joints",
-            "set record.side: motor",
-            P=inverse,
-            p=shift,
-            T=R.T,
-        )
-        yield make(
-            "side",
-            "positions and torques of the joints are taken as those of the motors",
-            "set record.side: joint",
-            P=R,
-            p=-R @ shift,
-            T=inverse.T,
-        )
+        for cause, remedy, maps in (
+            (
+                "torques of the motors are taken as torques of the joints: the gear ratio is missing",
+                "set record.torque_side: motor",
+                {"T": R.T},
+            ),
+            (
+                "torques of the joints are taken as torques of the motors: the gear ratio is applied twice",
+                "set record.torque_side: joint",
+                {"T": inverse.T},
+            ),
+            ("positions of the motors are taken as positions of the joints", motors, {"P": inverse, "p": shift}),
+            ("positions of the joints are taken as positions of the motors", f"{joints}, torque_side: motor", {"P": R, "p": -R @ shift}),
+            ("positions and torques of the motors are taken as those of the joints", motors, both[0]),
+            ("positions and torques of the joints are taken as those of the motors", joints, both[1]),
+        ):
+            yield make("side", cause, remedy, **maps)
     if not np.allclose(constant, np.eye(n)):
         remedy = "look at record.units.tau: A of currents, N*m of torques"
-        yield make(
-            "unit",
-            "torques are taken as currents: torque constants are applied to them",
-            remedy,
-            T=R.T @ np.linalg.inv(constant) @ inverse.T,
-        )
-        yield make("unit", "currents are taken as torques: torque constants are missing", remedy, T=R.T @ constant @ inverse.T)
+        T = R.T @ np.linalg.inv(constant) @ inverse.T
+        yield make("unit", "torques are taken as currents: torque constants are applied to them", remedy, T=T)
+        yield make("unit", "currents are taken as torques: torque constants are missing", remedy, T=np.linalg.inv(T))
     if shift.any():
-        yield make(
-            "zero", "the offsets of the drives are used twice or with the wrong sign", "look at the sign of drives.offset", p=-2 * shift
-        )
-        yield make(
-            "zero", "the offsets of the drives are missing", "set record.side: motor, or add drives.offset to the positions", p=shift
-        )
-        yield make("zero", "the offsets of the drives are added to positions that have them", "leave drives.offset out", p=-shift)
+        for cause, remedy, p in (
+            ("the offsets of the drives are used twice or with the wrong sign", "look at the sign of drives.offset", -2 * shift),
+            ("the offsets of the drives are missing", "set record.side: motor, or add drives.offset to the positions", shift),
+            ("the offsets of the drives are added to positions that have them", "leave drives.offset out", -shift),
+        ):
+            yield make("zero", cause, remedy, p=p)
     own = np.diag(R).copy()
     for i, k in combinations(range(n), 2):
         if "motor" not in sides or np.isclose(abs(own[i]), abs(own[k])):
@@ -333,6 +329,7 @@ def table(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
                 f"alpha of frame {j} is wrong by {text}{sign}",
                 f"look at alpha of frame {j}: {_angle(value)} fits",
                 constants={f"free_alpha{j}": value},
+                of=f"alpha of frame {j}",
             )
         for key in ("d", "r", "b"):
             length = entry.get(f"free_{key}{j}", 0.0)
@@ -342,6 +339,7 @@ def table(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
                     f"{key} of frame {j} has the wrong sign",
                     f"look at {key} of frame {j}: {-length:g} fits",
                     constants={f"free_{key}{j}": -length},
+                    of=f"{key} of frame {j}",
                 )
                 for text, factor in FACTORS.items() if not SHORTEST < abs(length) < LONGEST else ():
                     yield make(
@@ -349,6 +347,7 @@ def table(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
                         f"{key} of frame {j} is to be taken {text} times: mm and m",
                         f"give {key} of frame {j} in m",
                         constants={f"free_{key}{j}": factor * length},
+                        of=f"{key} of frame {j}",
                     )
         d, r = entry[f"free_d{j}"], entry[f"free_r{j}"]
         if d != r:

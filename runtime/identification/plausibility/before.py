@@ -15,6 +15,7 @@ from runtime.identification.plausibility.samples import Samples
 from runtime.model.generated import GeneratedModel, joint_units
 from runtime.model.inertia import PhysicalModel
 from runtime.records.record import Record
+from runtime.records.stream import Stream
 
 Array = np.ndarray
 
@@ -64,11 +65,11 @@ def _per_joint(names: Sequence[int], values: Array, unit: Sequence[str], chosen:
     return ", ".join(f"{values[j]:.3g} {unit[j]} (joint {names[j]})" for j in np.flatnonzero(chosen)[:4])
 
 
-def times(records: Sequence[Record]) -> Check:
+def times(records: Sequence[Record | Stream]) -> Check:
     """Sampling rate and duration of the records."""
     question, limit = "Are the times those of a log?", f"{RATES[0]:g} Hz to {RATES[1] / 1e3:g} kHz"
     record = min(records, key=lambda one: one.rate)
-    duration = float(record.t[-1] - record.t[0])
+    duration = len(record) / record.rate
     text = f"{record.rate:.4g} Hz over {duration:.4g} s"
     wrong = any(not RATES[0] <= one.rate <= RATES[1] for one in records)
     remedy = "look at the unit of the time column (record.units.t: ms, us) and at record.rate"

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from runtime.identification.plausibility.alternatives import Alternative
-from runtime.identification.plausibility.fits import MU, Grams, least_squares, physical_fit, quick_fit, solved
-from runtime.identification.plausibility.trials import DECISIVE, Problem, Trial, moving
+from runtime.identification.plausibility.alternatives import Alternative, unchanged
+from runtime.identification.plausibility.fits import MU, Grams, least_squares, quick_fit, solved
+from runtime.identification.plausibility.trials import DECISIVE, Problem, Trial
 from runtime.model.generated import joint_units
 
 Array = np.ndarray
@@ -30,6 +30,8 @@ WORTH = 0.4
 """Gain of the first step over DECISIVE from which a number is searched."""
 SMALLEST = {"factor": 0.15, "length": 0.15, "zero": 0.17, "angle": 0.17}
 """What is told of a number, relative or rad: less is within what robots and records are."""
+NEARLY = 1e-3
+"""Part of the effect of a number outside the span of W, relative, from which a record may tell it; finite differences blur it."""
 SEARCHED = 4
 """Numbers searched at most."""
 
@@ -55,11 +57,12 @@ class Quantity:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """First step of one quantity: xi, its deviation, its gain in nats."""
+    """First step of one quantity: xi, its deviation, its gain in nats; whether its effect lies in the span of W."""
 
     xi: float
     sigma: float
     gain: float
+    within: bool = False
 
 
 def quantities(problem: Problem) -> list[Quantity]:
@@ -67,23 +70,25 @@ def quantities(problem: Problem) -> list[Quantity]:
     return [*_factors(problem), *_zeros(problem), *(_entries(problem) if problem.variants is not None else ())]
 
 
-def _plain(problem: Problem) -> Alternative:
-    n = problem.samples.n
-    return Alternative("", "", "", np.eye(n), np.zeros(n), np.eye(n))
-
-
 def _factors(problem: Problem) -> Iterator[Quantity]:
-    """exp(xi) = the torque that the joint would need, over that of the record."""
-    plain, n = _plain(problem), problem.samples.n
-    for j, joint in enumerate(problem.model.JOINTS):
-        if n < 2 and not problem.barrier.near_values:
-            return
+    """exp(xi) = the torque that the joint would need, over that of the record; of all joints together."""
+    plain, n, back = unchanged(problem.samples.n), problem.samples.n, np.linalg.inv(problem.F)
+
+    def common(xi: float) -> Alternative:
+        factor = float(np.exp(xi))
+        cause = f"all torques are to be multiplied by {factor:.3g}"
+        remedy = f"look at unit, torque constants and side of the torques ({_guess(factor)})"
+        return replace(plain, cause=cause, remedy=remedy, kind="factor", T=factor * np.eye(n), of="a common factor of all torques")
+
+    yield Quantity("factor", common, 2.6)
+    for j, joint in enumerate(problem.model.JOINTS if n > 1 else ()):
 
         def change(xi: float, j: int = j, joint: int = joint) -> Alternative:
             factor = float(np.exp(xi))
             cause = f"the torque of joint {joint} is to be multiplied by {factor:.3g}"
             remedy = f"look at ratio, torque constant and unit of joint {joint} ({_guess(factor)})"
-            return replace(plain, cause=cause, remedy=remedy, kind="factor", T=np.diag(np.where(np.arange(n) == j, factor, 1.0)))
+            T = back @ np.diag(np.where(np.arange(n) == j, factor, 1.0)) @ problem.F
+            return replace(plain, cause=cause, remedy=remedy, kind="factor", T=T, of=f"a factor of the torque of joint {joint}")
 
         yield Quantity("factor", change, 2.6)
 
@@ -103,7 +108,7 @@ def _guess(factor: float) -> str:
 
 
 def _zeros(problem: Problem) -> Iterator[Quantity]:
-    plain, n = _plain(problem), problem.samples.n
+    plain, n = unchanged(problem.samples.n), problem.samples.n
     for j, joint in enumerate(problem.model.JOINTS):
         if joint_units(problem.model)[j] != "rad":
             continue
@@ -111,7 +116,9 @@ def _zeros(problem: Problem) -> Iterator[Quantity]:
         def change(xi: float, j: int = j, joint: int = joint) -> Alternative:
             cause = f"the zero of joint {joint} is off by {np.degrees(xi):.3g} degrees"
             remedy = f"look at theta of the frame of joint {joint}, at drives.offset and at the calibration of its encoder"
-            return replace(plain, cause=cause, remedy=remedy, kind="zero", p=np.where(np.arange(n) == j, xi, 0.0))
+            return replace(
+                plain, cause=cause, remedy=remedy, kind="zero", p=np.where(np.arange(n) == j, xi, 0.0), of=f"the zero of joint {joint}"
+            )
 
         yield Quantity("zero", change, 1.2)
 
@@ -119,7 +126,7 @@ def _zeros(problem: Problem) -> Iterator[Quantity]:
 def _entries(problem: Problem) -> Iterator[Quantity]:
     """d, r, b relative to their size; alpha."""
     assert problem.variants is not None
-    plain = _plain(problem)
+    plain = unchanged(problem.samples.n)
     for key, value in problem.variants.CONSTANTS.items():
         name, frame = key[5:].rstrip("0123456789"), key.lstrip("abcdefghijklmnopqrstuvwxyz_")
         if not key.startswith("free_") or name not in ("d", "r", "b", "alpha"):
@@ -129,7 +136,7 @@ def _entries(problem: Problem) -> Iterator[Quantity]:
             def turned(xi: float, key: str = key, value: float = value, frame: str = frame) -> Alternative:
                 cause = f"alpha of frame {frame} is off by {np.degrees(xi):.3g} degrees"
                 remedy = f"look at alpha of frame {frame}: {value + xi:.3f} rad fits"
-                return replace(plain, cause=cause, remedy=remedy, kind="angle", constants={key: value + xi})
+                return replace(plain, cause=cause, remedy=remedy, kind="angle", constants={key: value + xi}, of=f"alpha of frame {frame}")
 
             yield Quantity("angle", turned, 1.2)
         elif value:
@@ -138,7 +145,7 @@ def _entries(problem: Problem) -> Iterator[Quantity]:
                 length = value * float(np.exp(xi))
                 cause = f"{name} of frame {frame} is {length:.4g} m rather than {value:.4g} m"
                 remedy = f"measure {name} of frame {frame}: {length:.4g} m fits"
-                return replace(plain, cause=cause, remedy=remedy, kind="length", constants={key: length})
+                return replace(plain, cause=cause, remedy=remedy, kind="length", constants={key: length}, of=f"{name} of frame {frame}")
 
             yield Quantity("length", longer, 1.0)
 
@@ -146,39 +153,35 @@ def _entries(problem: Problem) -> Iterator[Quantity]:
 def first_steps(problem: Problem, which: list[Quantity]) -> list[Step]:
     """xi, sigma, gain of each quantity on its own, to first order."""
     chi, sigma = problem.given.X, problem.given.sigma
-    plain = _plain(problem)
-    D, e, mask = _standard(problem, plain), None, moving(problem.samples.qd)
-    e = (plain.torque(problem.samples) - D @ chi) / sigma * mask
-    A, _ = Grams.of(D, plain.torque(problem.samples), mask).weighted(sigma)
+    D, now, mask = _rows(problem, unchanged(problem.samples.n))
+    e = (problem.tau - now) / sigma * mask
+    A, _ = Grams.of(D, problem.tau, mask).weighted(sigma)
     _, B = problem.barrier.derivatives(chi, MU[-1])
     H = A + B
     share = problem.N / max(float(mask.sum(axis=0).mean()), 1.0)
     steps = []
     for quantity in which:
-        alternative = quantity.change(STEP)
-        if quantity.kind == "factor":
-            J = -(D @ chi) * (np.diag(alternative.T) > 1.0)  # (1 + xi) Y - W chi, its residuals over 1 + xi
-        else:
-            J = (_standard(problem, alternative) @ chi - D @ chi) / STEP
+        J = (_rows(problem, quantity.change(STEP))[1] - now) / STEP
+        within = np.linalg.norm(J) < STEP**2 * np.linalg.norm(now) or problem.beyond(J[:, :, None]) < NEARLY
         J = J / sigma * mask
         WJ = np.einsum("kjp,kj->p", D, J / sigma)
         left = float((J * J).sum() - WJ @ solved(H, WJ))
-        if left <= 1e-9 * float((J * J).sum()) or left <= 0:
-            steps.append(Step(0.0, np.inf, 0.0))
+        if within or left <= 0:
+            steps.append(Step(0.0, np.inf, 0.0, within))
             continue
         xi = float((J * e).sum()) / left
         steps.append(Step(xi, float((left * share) ** -0.5), 0.5 * share * xi**2 * left))
     return steps
 
 
-def _standard(problem: Problem, alternative: Alternative) -> Array:
-    """Regressor over the standard parameters, shape (K, n, p)."""
-    q, qd, qdd = alternative.states(problem.samples)
-    with np.errstate(all="ignore"):
-        if alternative.on_data:
-            return np.asarray(problem.model.regressor(q, qd, qdd) @ problem.physical.K)
-        assert problem.variants is not None
-        return np.asarray(problem.variants.regressor(q, qd, qdd, out=None, **alternative.constants))
+def _rows(problem: Problem, alternative: Alternative) -> tuple[Array, Array, Array]:
+    """Rows over the standard parameters, shape (K, n, p), torques that those of the study explain, and the rows used."""
+    rows = problem.rows(alternative)
+    if rows is None:  # a loop that does not close
+        return _rows(problem, unchanged(problem.samples.n))
+    D, Y, mask = rows
+    D = D @ problem.physical.K if alternative.on_data else D
+    return D, D @ problem.given.X + problem.tau - Y, mask
 
 
 def searched(problem: Problem) -> list[Trial]:
@@ -190,7 +193,9 @@ def searched(problem: Problem) -> list[Trial]:
     for k in order:
         if steps[k].gain >= WORTH * DECISIVE:
             trials.append(_best(problem, which[k], steps[k]))
-    return [trial for trial in trials if trial is not None]
+    small = [one.change(SMALLEST[one.kind]) for one, step in zip(which, steps, strict=True) if step.within]
+    hidden = [Trial(one, -np.inf, None, -np.inf, equivalent=True) for one in small if problem.hides(one)]
+    return [*(trial for trial in trials if trial is not None), *hidden]
 
 
 def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
@@ -202,9 +207,8 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
         grams = problem.grams(alternative)
         if grams is None:
             return np.inf
-        volume = problem.N * float(np.linalg.slogdet(alternative.T)[1])
         fit = quick_fit(problem.standard(grams), problem.barrier, problem.N, least_squares(grams, problem.N).sigma)
-        scores[xi] = fit.score - volume
+        scores[xi] = fit.score
         return scores[xi]
 
     near = float(np.clip(step.xi, -quantity.span, quantity.span))
@@ -223,7 +227,5 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
     grams = problem.grams(alternative)
     if grams is None:
         return None
-    volume = problem.N * float(np.linalg.slogdet(alternative.T)[1])
-    fit = physical_fit(problem.standard(grams), problem.barrier, problem.N, least_squares(grams, problem.N).sigma)
-    gain = problem.given.score - fit.score + volume - 0.5 * np.log(problem.N)  # one parameter more
-    return Trial(alternative, -np.inf, fit, float(gain))
+    trial = problem.fitted(alternative, grams)
+    return replace(trial, gain=trial.gain - 0.5 * float(np.log(problem.N)))  # one parameter more

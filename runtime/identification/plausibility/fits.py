@@ -3,10 +3,10 @@
 Rows are weighed by joint with their own residuals, so that a wrist counts as much as a shoulder. The score is the negative logarithm of the
 likelihood with those weights profiled out, in nats,
 
-    score = N sum_j log(sigma_j) - N log|det T|,   sigma_j^2 = max(||Y_j - W_j chi||^2 / N_j, floor_j^2)
+    score = N sum_j log(sigma_j),   sigma_j^2 = max(||Y_j - W_j chi||^2 / N_j, floor_j^2)
 
-N the rows of a joint that count (residuals are coloured), T the map of the torques where one is tried; a difference of 5 is a likelihood ratio of
-150. `physical_fit` minimises half the weighted squares plus a barrier
+N the rows of a joint that count (residuals are coloured); a difference of 5 is a likelihood ratio of 150. Rows j are those of a torque as it was
+measured, whatever map of the torques is tried (`runtime.identification.plausibility.trials`). `physical_fit` minimises half the weighted squares plus a barrier
 
     mu sum_links [tr(P P0^-1) - log det P - log(M R^2 - tr S)] + mu sum_elements [c/c0 - log c] + HEAVY M/M0
 
@@ -51,30 +51,35 @@ RIDGE = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Grams:
-    """[W_j Y_j]'[W_j Y_j] of every joint, shape (n, b + 1, b + 1), and the number of rows of each, (n,)."""
+    """Normal equations of every torque.
+
+    Attributes
+    ----------
+    of_joints : ndarray, shape (n, b + 1, b + 1)
+        [W_j Y_j]'[W_j Y_j].
+    rows : ndarray of int, shape (n,)
+    measured : ndarray, shape (n,)
+        ||tau_j||^2 over the same rows.
+    """
 
     of_joints: Array
     rows: Array
+    measured: Array
 
     @classmethod
-    def of(cls, D: Array, Y: Array, mask: Array) -> Grams:
-        """Of a regressor (K, n, b), torques (K, n) and the rows used, bool (K, n)."""
+    def of(cls, D: Array, Y: Array, mask: Array, tau: Array | None = None) -> Grams:
+        """Of a regressor (K, n, b), torques (K, n) and the rows used, bool (K, n). tau : measured torques; default: Y."""
         grams = []
         for j in range(Y.shape[1]):
             A = np.column_stack([D[:, j], Y[:, j]])[mask[:, j]]
             grams.append(A.T @ A)
-        return cls(np.array(grams), mask.sum(axis=0))
+        return cls(np.array(grams), mask.sum(axis=0), ((Y if tau is None else tau) ** 2 * mask).sum(axis=0))
 
     def mapped(self, K: Array) -> Grams:
         """With the columns W K, K of shape (b, p)."""
         M = np.zeros((K.shape[0] + 1, K.shape[1] + 1))
         M[:-1, :-1], M[-1, -1] = K, 1.0
-        return Grams(M.T @ self.of_joints @ M, self.rows)
-
-    @property
-    def measured(self) -> Array:
-        """||Y_j||^2, shape (n,)."""
-        return np.asarray(self.of_joints[:, -1, -1])
+        return Grams(M.T @ self.of_joints @ M, self.rows, self.measured)
 
     def squares(self, X: Array) -> Array:
         """||Y_j - W_j X||^2, shape (n,)."""
@@ -102,7 +107,7 @@ class Fit:
     X : ndarray, shape (b,) or (p,), SI
     sigma : ndarray, shape (n,), N m or N
     errors : ndarray, shape (n,)
-        100 ||Y_j - W_j X|| / ||Y_j||, %.
+        100 ||Y_j - W_j X|| / ||tau_j||, %.
     score : float, nats
         Smaller is better.
     penalty : float, nats

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from runtime.identification.plausibility.alternatives import unchanged
 from runtime.identification.plausibility.fits import MU, Fit, Grams, least_squares, physical_fit, solved
-from runtime.identification.plausibility.trials import Problem, moving
+from runtime.identification.plausibility.trials import Problem
 
 Array = np.ndarray
 
@@ -56,19 +57,19 @@ def gravity_direction(problem: Problem) -> Gravity | None:
     size = float(np.linalg.norm(given))
     if not size:
         return None
-    s = problem.samples
 
-    def D(g: Array) -> Array:
+    def rows(g: Array) -> tuple[Array, Array, Array] | None:
         constants = dict(zip(("free_gx", "free_gy", "free_gz"), map(float, g), strict=True))
-        assert problem.variants is not None
-        return np.asarray(problem.variants.regressor(s.q, s.qd, s.qdd, out=None, **constants))
+        return problem.rows(unchanged(problem.samples.n, constants=constants))
 
-    rest = D(np.zeros(3))
-    by_axis = np.stack([D(np.eye(3)[a]) - rest for a in range(3)])
-    Y, mask = s.tau - s.known, moving(s.qd)
+    weightless, *axes = (rows(g) for g in (np.zeros(3), *np.eye(3)))
+    if weightless is None:
+        return None
+    rest, Y, mask = weightless
+    by_axis = np.stack([axis[0] - rest for axis in axes if axis is not None])
 
     def fit(u: Array) -> Fit:
-        grams = Grams.of(rest + size * np.tensordot(u, by_axis, axes=1), Y, mask)
+        grams = Grams.of(rest + size * np.tensordot(u, by_axis, axes=1), Y, mask, problem.tau)
         return physical_fit(grams, problem.barrier, problem.N, least_squares(grams, problem.N).sigma, 2)
 
     starts = [given / size, *(sign * np.eye(3)[a] for a in range(3) for sign in (1.0, -1.0))]

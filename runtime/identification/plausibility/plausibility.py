@@ -16,14 +16,15 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.identification.checklist import WORST, Check, State
+from runtime.identification.plausibility.alternatives import times_of
 from runtime.identification.plausibility.before import REST, before_checks, times
 from runtime.identification.plausibility.continuous import searched
 from runtime.identification.plausibility.delay import CERTAIN, LONGEST, Delay, delay
 from runtime.identification.plausibility.excited import excited
 from runtime.identification.plausibility.gravity import Gravity, gravity_direction
 from runtime.identification.plausibility.known import KnownValues, known_values
-from runtime.identification.plausibility.samples import STANDING, Samples, samples_of
-from runtime.identification.plausibility.trials import DECISIVE, Problem, Trial, decisive, problem_of, tried
+from runtime.identification.plausibility.samples import STANDING, Samples, excerpts, samples_of
+from runtime.identification.plausibility.trials import ALIKE, DECISIVE, Problem, Trial, decisive, problem_of, tried
 from runtime.model.generated import GeneratedModel, joint_units
 from runtime.model.inertia import physical_model
 from runtime.observation.observation import observe
@@ -130,7 +131,7 @@ def plausibility(
     ----------
     model : GeneratedModel
     records : Record, Stream, or a sequence of them
-        Joint side, SI. Records that are read by blocks are not judged.
+        Joint side, SI. Of a record that is read by blocks some excerpts are judged.
     study : Study, optional
         Default: Study().
     variants : GeneratedModel, optional
@@ -138,17 +139,17 @@ def plausibility(
     """
     study = study or Study()
     several = list(records) if isinstance(records, Sequence) else [records]
-    whole = [record for record in several if isinstance(record, Record)]
-    if len(whole) < len(several):
-        return Plausibility(
-            (Check("Do record and robot file suit each other?", "open", "Not asked: the record is read by blocks", "", "set stream: off"),)
-        )
     at("plausibility of the record")
-    checks = [times(whole)]
+    checks = [times(several)]
+    whole = [part for record in several for part in ([record] if isinstance(record, Record) else excerpts(record, study))]
     try:
         samples = samples_of(whole, study)
     except InputError as e:
         return Plausibility((*checks, Check("Do record and robot file suit each other?", "open", f"Not asked: {e.message}")))
+    try:
+        model.regressor(samples.q, samples.qd, samples.qdd)
+    except ValueError as e:
+        return Plausibility((*checks, closure(str(e))))
     try:
         physical = physical_model(model)
     except InputError:
@@ -160,9 +161,10 @@ def plausibility(
     if physical is None or not enough:
         reason = "too few samples at which every joint moves" if not enough else "the model has no standard parameters"
         return Plausibility((*checks, Check("Does physics agree?", "open", f"Not asked: {reason}")))
-    problem = problem_of(model, samples, variants)
+    sides = study.record[0].sides if study.record else ("joint", "joint")
+    problem = problem_of(model, samples, variants, torque_side=sides[1])
     known = known_values(problem) if problem.barrier.near_values else None
-    alone = problem_of(model, samples, variants, values=False) if known is not None else problem
+    alone = problem_of(model, samples, variants, torque_side=sides[1], values=False) if known is not None else problem
     gravity = gravity_direction(problem)
     late = delays(model, whole, study)
     asked = (physics(model, alone), size(model, alone), None if late is None else delayed(late), None if known is None else values(known))
@@ -170,26 +172,28 @@ def plausibility(
     trials: list[Trial] = []
     if variants is not None or any(check.state in WORST[:2] for check in checks):
         at("what would explain the record better")
-        sides = study.record[0].sides if study.record else ("joint", "joint")
         trials = _ranked([*tried(problem, sides), *searched(problem)])
+        if variants is not None and not any(key.startswith("free_alpha") for key in variants.CONSTANTS):
+            text = "Not asked: the loops of the robot file would not close with others"
+            checks.append(Check("Are angles and lengths of the table of frames right?", "open", text))
     named = decisive(trials, problem.given)
     checks += [] if gravity is None else [direction(gravity, named)]
     if trials:
         checks.append(better(problem, named))
-    return Plausibility(
-        tuple(checks), tuple(t for t in trials if t.fit is not None)[:10], tuple(named), _equivalent(problem), late, gravity, known
-    )
+    hidden = tuple(dict.fromkeys(trial.alternative.subject for trial in trials if trial.equivalent))
+    return Plausibility(tuple(checks), tuple(t for t in trials if t.fit is not None)[:10], tuple(named), hidden, late, gravity, known)
 
 
 def _ranked(trials: Sequence[Trial]) -> list[Trial]:
-    """The best first; of the sampling rates one alone, which has to gain RATE more: a slower motion gives the parameters more room."""
-    trials = [replace(t, gain=t.gain - RATE) if t.alternative.kind == "rate" else t for t in trials]
-    ordered = sorted(trials, key=lambda trial: -trial.gain)
-    kept: list[Trial] = []
-    for trial in ordered:
-        if not (trial.alternative.kind == "rate" and any(k.alternative.kind == "rate" and k.fit is not None for k in kept)):
-            kept.append(trial)
-    return kept
+    """The best first; sampling rates as one, which has to gain RATE more: a slower motion gives the parameters more room."""
+    rates = [replace(t, gain=t.gain - RATE) for t in trials if t.alternative.kind == "rate" and t.fit is not None]
+    kept = [t for t in trials if t.alternative.kind != "rate" or t.equivalent]
+    if rates:
+        best = max(rates, key=lambda t: t.gain)
+        alike = sorted(t.alternative.rate for t in rates if t.gain >= (1 - ALIKE) * best.gain)
+        cause = f"the sampling rate is {times_of(alike)} the stated one"
+        kept.append(replace(best, alternative=replace(best.alternative, cause=cause)))
+    return sorted(kept, key=lambda trial: -trial.gain)
 
 
 def rest(model: GeneratedModel, records: Sequence[Record], study: Study, samples: Samples) -> Check:
@@ -237,6 +241,12 @@ def _error(model: GeneratedModel, records: Sequence[Record], study: Study) -> fl
     from runtime.estimators.methods import estimate_of
 
     return estimate_of(observe(model, records, study), EstimateSettings(), model=model).relative_error
+
+
+def closure(message: str) -> Check:
+    """The loops of the robot file do not close in the positions of the record."""
+    remedy = "look at sign, zero and order of the positions, at their unit, and at the lengths and the start of the loop"
+    return Check("Do the loops close in the positions of the record?", "no", f"No: {message}", "every instant", remedy)
 
 
 def physics(model: GeneratedModel, problem: Problem) -> Check:
@@ -340,14 +350,6 @@ def better(problem: Problem, named: Sequence[Trial]) -> Check:
     text = f"No: {causes[0]}" + (f" (or: {'; '.join(causes[1:])})" if causes[1:] else "")
     text += f"; the error of joint {problem.model.JOINTS[j]} goes from {problem.given.errors[j]:.1f} to {best.fit.errors[j]:.1f} %"
     return Check(question, "no", text, limit, best.alternative.remedy)
-
-
-def _equivalent(problem: Problem) -> tuple[str, ...]:
-    """What leaves the span of W as it is."""
-    texts = []
-    if not problem.barrier.near_values:
-        texts.append("a common factor of all torques (no values in the robot file to compare with)")
-    return tuple(texts)
 
 
 def _sentence(text: str) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.observation.filters import Lowpass, filtered_states, lowpass_filtered, median_filtered
 from runtime.records.record import Record
+from runtime.records.stream import Stream
 from runtime.settings.study import Study
 
 Array = np.ndarray
@@ -22,6 +23,8 @@ MOST = 500
 """Instants kept of all records."""
 DYNAMIC = 25.0
 """Cut-off over the frequency below which 95 % of the power of the velocities lies: a multiple of the rule of the chapter, since accelerations carry higher frequencies."""
+EXCERPTS = (8, 40_000)
+"""Number and length, samples, of what is read of a record that is read by blocks."""
 STANDING = 0.02
 """Speed of a joint that stands, of its largest speed: sign(qd) is noise there, and dry friction is not the law of motion."""
 
@@ -78,6 +81,27 @@ class Samples:
         """At most `most` instants, evenly drawn."""
         step = -(-len(self) // most)
         return self if step <= 1 else self.at(np.arange(0, len(self), step))
+
+
+def excerpts(stream: Stream, study: Study) -> list[Record]:
+    """EXCERPTS of a stream, evenly spread over the window; the whole of a short one."""
+    t0, t1 = study.rows.window
+    kept = [((t >= (-np.inf if t0 is None else t0)) & (t <= (np.inf if t1 is None else t1))) for t in stream.times()]
+    inside = np.flatnonzero(np.concatenate(kept))
+    number, length = EXCERPTS
+    if len(inside) <= number * length:
+        number, length = 1, len(inside)
+    starts = np.linspace(0, len(inside) - length, number).astype(int)
+    wanted = [inside[a : a + length] for a in starts]
+    parts: list[list[tuple[Array, ...]]] = [[] for _ in wanted]
+    first = 0
+    for block in stream.blocks():
+        for part, numbers in zip(parts, wanted, strict=True):
+            own = numbers[(numbers >= first) & (numbers < first + len(block[0]))] - first
+            if len(own):
+                part.append(tuple(x[own] for x in block))
+        first += len(block[0])
+    return [Record(*(np.concatenate(x) for x in zip(*part, strict=True)), name=stream.name) for part in parts if part]
 
 
 def samples_of(records: Sequence[Record], study: Study, most: int = MOST) -> Samples:

@@ -7,21 +7,22 @@ best so far are fitted under the conditions of a physical robot, near the values
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import qr
 
-from runtime.identification.plausibility.alternatives import Alternative, alternatives
+from runtime.identification.plausibility.alternatives import Alternative, alternatives, unchanged
 from runtime.identification.plausibility.fits import Barrier, Fit, Grams, least_squares, physical_fit, quick_fit
 from runtime.identification.plausibility.samples import Samples
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, drives_of
 from runtime.model.inertia import PhysicalModel, physical_model
 
 Array = np.ndarray
 
 DECISIVE = 20.0
 """Gain of an alternative, nats, from which it is named, ..."""
-VISIBLE = 1.2
+VISIBLE = 1.05
 """... where it divides the error of a joint by this at least, or the distance from the values of the robot file shrinks as much as DECISIVE."""
 ALIKE = 0.4
 """Alternatives within this share of the best gain are named with it."""
@@ -33,8 +34,12 @@ REFINED = 10
 """Alternatives fitted to the end."""
 FARTHEST = 20.0
 """Reach, m, beyond which a robot file is not believed."""
+ROUNDING = 1e-12
+"""Columns of W below this, of the largest, are rounding of entries such as cos(pi/2)."""
 SAME = 0.3
-"""Scores within this, nats, are the same: no record tells these models apart."""
+"""Scores within this, nats, are the same: no record tells these models apart, ..."""
+WITHIN = 1e-7
+"""... where the columns of one are combinations of those of the other, up to this relative remainder."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +55,15 @@ class Trial:
         Under the conditions of a physical robot; None where the bound already loses.
     gain : float, nats
         Score of the study as given minus its own.
+    equivalent : bool
+        Whether no fit can tell it from the study as given.
     """
 
     alternative: Alternative
     bound: float
     fit: Fit | None
     gain: float
+    equivalent: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,35 +76,100 @@ class Problem:
         The emitted module, and that of `symgen.variants` or None.
     physical : PhysicalModel
     samples : Samples
+    size : float, m
+        Of the robot.
     barrier : Barrier
     N : float
         Rows of a joint that count.
     free, given : Fit
         The study as it is: least squares, and under the conditions of a physical robot.
+    F : ndarray, shape (n, n)
+        Torques of the files from those of the joints.
+    basis : ndarray, shape (K*n, rank)
+        Orthonormal basis of the span of W, rows over the residual of their joint.
     """
 
     model: GeneratedModel
     variants: GeneratedModel | None
     physical: PhysicalModel
     samples: Samples
+    size: float
     barrier: Barrier
     N: float
     free: Fit
     given: Fit
+    F: Array
+    basis: Array
 
-    def grams(self, alternative: Alternative) -> Grams | None:
-        """Normal equations of an alternative, over the standard parameters where its table changes; None where it cannot be evaluated."""
-        q, qd, qdd = alternative.states(self.samples)
+    def regressor(self, alternative: Alternative) -> Array | None:
+        """D of an alternative, shape (K, n, b), over the standard parameters where its table changes; None where it cannot be evaluated."""
         model = self.model if alternative.on_data else self.variants
         assert model is not None
+        q, qd, qdd = alternative.states(self.samples)
         try:
             with np.errstate(all="ignore"):
-                D = model.regressor(q, qd, qdd, out=None, **alternative.constants)
+                D = np.asarray(model.regressor(q, qd, qdd, out=None, **alternative.constants))
         except ValueError:  # a loop that does not close
             return None
-        if not np.isfinite(D).all():
+        size = np.abs(D).max(axis=(0, 1), initial=0.0)
+        D[:, :, size < ROUNDING * size.max(initial=0.0)] = 0.0
+        return D if np.isfinite(size).all() else None
+
+    def rows(self, alternative: Alternative) -> tuple[Array, Array, Array] | None:
+        """F T^-1 W', F tau - F T^-1 known and the rows used, bool: T tau - known = W' X' in the torques of the files F tau.
+
+        So every alternative explains the same numbers, and the residuals of coupled motors are not mixed.
+        """
+        D = self.regressor(alternative)
+        if D is None:
             return None
-        return Grams.of(D, alternative.torque(self.samples), moving(qd))
+        back = self.F @ np.linalg.inv(alternative.T)
+        still = ~moving(alternative.states(self.samples)[1])
+        mask = still @ (np.abs(back) > 1e-12).T == 0
+        return np.einsum("ij,kjp->kip", back, D), self.tau - self.samples.known @ back.T, mask
+
+    @property
+    def tau(self) -> Array:
+        """Torques on the side of the files, shape (K, n)."""
+        return np.asarray(self.samples.tau @ self.F.T)
+
+    def grams(self, alternative: Alternative) -> Grams | None:
+        """Normal equations of an alternative; None where it cannot be evaluated."""
+        rows = self.rows(alternative)
+        return None if rows is None else Grams.of(*rows, self.tau)
+
+    def fitted(self, alternative: Alternative, grams: Grams, bound: float = -np.inf) -> Trial:
+        """An alternative under the conditions of a physical robot."""
+        fit = physical_fit(self.standard(grams), self.barrier, self.N, least_squares(grams, self.N).sigma)
+        return Trial(alternative, bound, fit, self.given.score - fit.score)
+
+    def beyond(self, V: Array) -> float:
+        """Largest part of the torques V, shape (K, n, m), on the side of the files, that no parameters of the study explain, relative."""
+        rows = (V / self.free.sigma[:, None]).reshape(-1, V.shape[2])
+        size = np.linalg.norm(rows, axis=0)
+        left = np.linalg.norm(rows - self.basis @ (self.basis.T @ rows), axis=0)
+        return float((left / np.where(size > 0, size, 1.0)).max(initial=0.0))
+
+    def hides(self, alternative: Alternative) -> bool:
+        """Whether no fit can tell an alternative from the study: its rows lie in the span of W, and physics asks the same of both.
+
+        The columns are tested on random combinations of them, beside the difference of the known torques.
+        """
+        rows = self.rows(alternative)
+        if rows is None:
+            return False
+        D, Y, _ = rows
+        scale = np.sqrt((D**2).sum(axis=(0, 1)))
+        V = (D / np.where(scale > 0, scale, 1.0)) @ np.random.default_rng(0).standard_normal((D.shape[2], 3))
+        known = Y - self.tau + self.samples.known @ self.F.T
+        known[np.abs(known) < 1e3 * ROUNDING * np.abs(self.tau).max()] = 0.0
+        if self.beyond(np.concatenate([V, known[:, :, None]], axis=2)) > WITHIN:
+            return False
+        barrier = _barrier(
+            self.physical, self.size, alternative.torque(self.samples), self.barrier.near_values
+        )  # bodies as large as the torques
+        other = replace(self, barrier=barrier).fitted(alternative, Grams.of(*rows, self.tau))
+        return abs(other.gain) < SAME
 
     def standard(self, grams: Grams) -> Grams:
         """The same over the standard parameters."""
@@ -110,20 +183,38 @@ def moving(qd: Array) -> Array:
     return np.asarray(np.abs(qd) > np.maximum(STANDING * np.abs(qd).max(axis=0), 1e-12))
 
 
-def problem_of(model: GeneratedModel, samples: Samples, variants: GeneratedModel | None = None, *, values: bool = True) -> Problem:
-    """The study as it is, fitted."""
-    physical = physical_model(model)
-    D = model.regressor(samples.q, samples.qd, samples.qdd)
-    mask, Y = samples.moving(), samples.tau - samples.known
-    base = Grams.of(D, Y, mask)
-    N = counting_rows(D, Y, mask, least_squares(base, 1.0).X)
+def problem_of(
+    model: GeneratedModel,
+    samples: Samples,
+    variants: GeneratedModel | None = None,
+    *,
+    torque_side: str = "joint",
+    values: bool = True,
+) -> Problem:
+    """The study as it is, fitted. torque_side : that of the files, motor or joint."""
+    physical, drives = physical_model(model), drives_of(model)
+    F = np.linalg.inv(drives.ratio.T) if drives is not None and torque_side == "motor" else np.eye(samples.n)
     size = reach(model, samples.q)
     size = size if size < FARTHEST else 1.0
-    torque = float(np.sqrt((Y**2).mean(axis=0)).max()) or 1.0
-    barrier = Barrier(physical, max(torque / (9.81 * size), 1e-3), 0.3 * size, 0.01 * torque, values=values)
+    barrier = _barrier(physical, size, samples.tau - samples.known, values)
+    none = Fit(np.zeros(0), np.ones(samples.n), np.zeros(samples.n), 0.0)
+    problem = Problem(model, variants, physical, samples, size, barrier, 1.0, none, none, F, np.zeros((0, 0)))
+    rows = problem.rows(unchanged(samples.n))
+    assert rows is not None
+    base = Grams.of(*rows, problem.tau)
+    N = counting_rows(*rows, least_squares(base, 1.0).X)
     free = least_squares(base, N)
     given = physical_fit(base.mapped(physical.K), barrier, N, free.sigma)
-    return Problem(model, variants, physical, samples, barrier, N, free, given)
+    weighted = (rows[0] / free.sigma[:, None]).reshape(-1, rows[0].shape[2])
+    scale = np.linalg.norm(weighted, axis=0)
+    Q, R, _ = qr(weighted / np.where(scale > 0, scale, 1.0), mode="economic", pivoting=True)
+    return replace(problem, N=N, free=free, given=given, basis=Q[:, np.abs(np.diag(R)) > 1e-9])
+
+
+def _barrier(physical: PhysicalModel, size: float, Y: Array, values: bool) -> Barrier:
+    """Bodies of the size, m, that torques Y, shape (K, n), ask for."""
+    torque = float(np.sqrt((Y**2).mean(axis=0)).max()) or 1.0
+    return Barrier(physical, max(torque / (9.81 * size), 1e-3), 0.3 * size, 0.01 * torque, values=values)
 
 
 def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
@@ -159,28 +250,26 @@ def tried(
     """All alternatives, the best first; those that cannot win are not fitted under the conditions of a physical robot."""
     every = alternatives(problem.model, problem.variants, sides)
     given, rows = problem.given, problem.samples.moving().sum(axis=0)
-    bounds: list[tuple[float, float, Alternative, Grams, Array]] = []
+    bounds: list[tuple[float, Alternative, Grams, Array]] = []
     for k, alternative in enumerate(every):
         progress(k, len(every))
         grams = problem.grams(alternative)
         if grams is not None and (grams.rows >= rows // 2).all():
-            volume = problem.N * float(np.linalg.slogdet(alternative.T)[1])
             free = least_squares(grams, problem.N)
-            bounds.append((free.score - volume, volume, alternative, grams, free.sigma))
+            bounds.append((free.score, alternative, grams, free.sigma))
     bounds.sort(key=lambda item: item[0])
-    quick: list[tuple[float, float, float, Alternative, Grams, Array]] = []
+    quick: list[tuple[float, float, Alternative, Grams]] = []
     best = given.score - DECISIVE
-    for bound, volume, alternative, grams, sigma in bounds:
+    for bound, alternative, grams, sigma in bounds:
         if len(quick) < LOOKED_AT and bound < best + ALIKE * (given.score - best):
-            standard = problem.standard(grams)
-            score = quick_fit(standard, problem.barrier, problem.N, sigma).score - volume
+            score = quick_fit(problem.standard(grams), problem.barrier, problem.N, sigma).score
             best = min(best, score)
-            quick.append((score, bound, volume, alternative, standard, sigma))
+            quick.append((score, bound, alternative, grams))
     quick.sort(key=lambda item: item[0])
-    trials = {id(a): Trial(a, bound, None, -np.inf) for bound, _, a, *_ in bounds}
-    for _, bound, volume, alternative, standard, sigma in quick[:REFINED]:
-        fit = physical_fit(standard, problem.barrier, problem.N, sigma)
-        trials[id(alternative)] = Trial(alternative, bound, fit, given.score - fit.score + volume)
+    trials = {id(a): Trial(a, bound, None, -np.inf, abs(bound - problem.free.score) < SAME and problem.hides(a)) for bound, a, *_ in bounds}
+    for _, bound, alternative, grams in quick[:REFINED]:
+        if not trials[id(alternative)].equivalent:
+            trials[id(alternative)] = problem.fitted(alternative, grams, bound)
     return sorted(trials.values(), key=lambda trial: -trial.gain)
 
 
