@@ -190,7 +190,7 @@ def _ranked(trials: Sequence[Trial]) -> list[Trial]:
     kept = [t for t in trials if t.alternative.kind != "rate" or t.equivalent]
     if rates:
         best = max(rates, key=lambda t: t.gain)
-        alike = sorted(t.alternative.rate for t in rates if t.gain >= (1 - ALIKE) * best.gain)
+        alike = sorted(t.alternative.rate for t in rates if t.gain >= best.gain - ALIKE * abs(best.gain))
         cause = f"the sampling rate is {times_of(alike)} the stated one"
         kept.append(replace(best, alternative=replace(best.alternative, cause=cause)))
     return sorted(kept, key=lambda trial: -trial.gain)
