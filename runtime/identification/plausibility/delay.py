@@ -3,7 +3,7 @@
     Y_j(t) = [W_j X](t - delta_j) + rho:      Y_j(t + delta) = W_j X - (delta_j - delta) d/dt(W_j X) + ...
 
 Gauss-Newton over X and every delta_j together: torques are shifted by the last delta (cubic interpolation of the filtered signal), W stays. The start is
-the best common shift of a grid. Rows near a reversal are left out, where sign(qd) has no derivative. Deviations are the larger of two, that of
+the best common shift of a grid. Rows near a reversal are left out, where sign(qd) has no derivative and the filter smears its step. Deviations are the larger of two, that of
 least squares and that of blocks of time taken as independent.
 
 A delay of a few ms is what controllers and field buses make of a record; at 1 Hz and 10 rad/s^2 it costs some per cent of the torque.
@@ -35,6 +35,8 @@ INSTANTS = 1500
 PASSES = 12
 BLOCKS = 30
 """Blocks of time behind the deviation."""
+SMEARED = 0.8
+"""Time around a jump of dry friction that is left out, periods of the cut-off."""
 CERTAIN = 3.0
 """Deviations from which a delay is one."""
 
@@ -144,7 +146,7 @@ class _Problem:
         inside = (record.t >= (-np.inf if t0 is None else t0)) & (record.t <= (np.inf if t1 is None else t1))
         inside[:margin] = inside[-margin:] = False
         kept = np.flatnonzero(inside)
-        step = max(1, int(0.8 * record.rate / (2 * cutoff)), -(-len(kept) // INSTANTS))
+        step = max(1, round(record.rate / (1.8 * cutoff)), -(-len(kept) // INSTANTS))
         kept = kept[::step]
         self.b, self.n = len(model.BASE_PARAMETERS), record.n
         if len(kept) * self.n <= 2 * self.b:
@@ -158,14 +160,13 @@ class _Problem:
 
         self.D = W(kept)
         self.rate = (W(kept + 1) - W(kept - 1)) * (record.rate / 2)
-        moving = np.abs(states.qd[kept]) > STANDING * np.abs(states.qd).max(axis=0)
-        same = np.sign(states.qd[kept + 1]) == np.sign(states.qd[kept - 1])
-        # an element along several joints has a reversal of its own: a jump of a column there is no rate
-        self.mask = moving & (same & (np.sign(states.qd[kept]) == np.sign(states.qd[kept + 1])))
-        jump = np.abs(np.diff(np.sign(self.D), axis=0, prepend=self.D[:1])) == 2
-        flat = np.isin(np.abs(self.D), (0.0, 1.0)).all(axis=0)  # columns of signs
+        # a step of dry friction is smeared by the filter of the torques: rows near a jump of a column of signs are left out
+        flat = np.isin(np.abs(self.D), (0.0, 1.0)).all(axis=0)
         self.rate[:, flat] = 0.0
-        self.mask &= ~(jump & flat).any(axis=2)
+        smeared = int(SMEARED * record.rate / cutoff)
+        steps = [np.sign(W(kept + k)) != np.sign(self.D) for k in (-smeared, -smeared // 2, smeared // 2, smeared)]
+        moving = np.abs(states.qd[kept]) > STANDING * np.abs(states.qd).max(axis=0)
+        self.mask = moving & ~(np.any(steps, axis=0) & flat).any(axis=2)
 
     def shifted(self, shift: Array) -> Array:
         """Y_j(t + delta_j), shape (K, n)."""
