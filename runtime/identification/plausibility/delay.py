@@ -35,7 +35,9 @@ INSTANTS = 1500
 PASSES = 12
 BLOCKS = 30
 """Blocks of time behind the deviation."""
-SMEARED = 0.8
+BAND = 1.8
+"""Independent values of filtered white noise, per second, over the cut-off: more instants than these are no more knowledge."""
+SMEARED = 0.25
 """Time around a jump of dry friction that is left out, periods of the cut-off."""
 CERTAIN = 3.0
 """Deviations from which a delay is one."""
@@ -146,9 +148,10 @@ class _Problem:
         inside = (record.t >= (-np.inf if t0 is None else t0)) & (record.t <= (np.inf if t1 is None else t1))
         inside[:margin] = inside[-margin:] = False
         kept = np.flatnonzero(inside)
-        step = max(1, round(record.rate / (1.8 * cutoff)), -(-len(kept) // INSTANTS))
+        step = max(1, int(0.8 * record.rate / (2 * cutoff)), -(-len(kept) // INSTANTS))
         kept = kept[::step]
         self.b, self.n = len(model.BASE_PARAMETERS), record.n
+        self.alike = max(1.0, record.rate / (BAND * cutoff) / step)
         if len(kept) * self.n <= 2 * self.b:
             raise InputError(f"{len(kept)} instants for {self.b} parameters and {self.n} delays; use a longer record", file=record.name)
         self.t, self.longest = record.t[kept], longest
@@ -209,7 +212,7 @@ class _Problem:
         r = e / sigma
         x = inverse @ np.einsum("kja,kj->a", Z, r)
         rows = int(self.mask.sum())
-        share = rows / max(rows - b - n, 1)
+        share = self.alike * rows / max(rows - b - n, 1)
         blocks = np.array_split(np.arange(K), min(BLOCKS, K))
         g = np.array([np.einsum("kja,kj->a", Z[k], r[k]) for k in blocks])
         between = inverse @ (g.T @ g) @ inverse * share * len(blocks) / (len(blocks) - 1)
