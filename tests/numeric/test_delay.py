@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaign import FULL, campaign
+from scipy.stats import binom
 
 import runtime
 import symgen
@@ -56,17 +57,21 @@ def test_the_delay_put_in_is_found(planar, ms: float) -> None:
 @pytest.mark.parametrize("robot", ["planar_2r", "tx40"])
 @pytest.mark.parametrize("ms", [0.0, 1.0, 5.0, 20.0])
 def test_two_deviations_hold_95_percent(planar, robot: str, ms: float) -> None:
-    """Over 50 records under SYMGEN_FULL, else 8; binomial bounds at one in a thousand. The deviation of a light wrist is milliseconds, since its torque is
-    mostly friction: there the common delay is asked for."""
+    """Over 50 records under SYMGEN_FULL, else 8: each joint's delay and the common one; binomial bounds at one in a thousand.
+
+    The deviation of a light wrist is above 0.3 ms, since its torque is mostly friction, which tells instants by its jumps alone: there it is the
+    deviation of the common delay, and of the three joints of the arm in the median, that is below."""
     model, chi = planar if robot == "planar_2r" else (symgen.model(robot), None)
     chi = values_of(model) if chi is None else chi
     runs = 50 if FULL else 8
     found = [runtime.delay(model, shifted_record(model, chi, seed, ms / 1e3), STUDY) for seed in range(runs)]
-    inside = np.mean([np.abs(f.shift - ms / 1e3) < 2 * f.sigma for f in found])
-    assert inside > (0.90 if FULL else 0.8)
-    if robot == "planar_2r":
-        assert max(float(np.max(f.sigma)) for f in found) < 3e-4
-    assert max(abs(f.common - ms / 1e3) for f in found) < 3e-4
+    inside = np.array([np.abs(f.shift - ms / 1e3) < 2 * f.sigma for f in found])
+    common = np.array([abs(f.common - ms / 1e3) < 2 * f.sigma_common for f in found])
+    for hits in (inside, common):
+        assert hits.sum() >= binom.ppf(1e-3, hits.size, 0.95)
+    sigma = np.array([f.sigma for f in found])
+    assert max(f.sigma_common for f in found) < 3e-4
+    assert sigma.max() < 3e-4 if robot == "planar_2r" else np.median(sigma, axis=0)[:3].max() < 3e-4
 
 
 def test_delays_beyond_the_record_are_refused(planar) -> None:

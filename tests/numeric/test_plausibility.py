@@ -15,11 +15,13 @@ import symgen
 from oracles.random_robots import random_parameters, random_robot
 from runtime.estimators.methods import estimate_of
 from runtime.estimators.semidefinite import LinearBounds, closest, everything
+from runtime.identification.plausibility import samples as samples_module
 from runtime.identification.plausibility.excited import UNSEEN, excited, unexcited_shares
 from runtime.identification.plausibility.fits import Barrier, Grams, least_squares, physical_fit
-from runtime.identification.plausibility.samples import samples_of
+from runtime.identification.plausibility.samples import excerpts, samples_of
 from runtime.model.inertia import physical_model
-from runtime.settings.study import Study
+from runtime.records.stream import RecordStream
+from runtime.settings.study import Study, study_from_mapping
 from symgen.description.yaml import parse_robot
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
@@ -105,6 +107,62 @@ def test_without_gravity_without_variants_and_of_one_column() -> None:
     found = runtime.plausibility(model, record, variants=symgen.variants(robot))
     assert found.gravity is None and found.worst is None
     assert runtime.plausibility(model, record).trials == ()
+
+
+PENDULUM = b"""\
+symgen: 1
+name: pendulum
+gravity: [0, -g, 0]
+constants: {L1: 0.4, g: 9.81}
+frames: {1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: L1}}
+elements: {FV: {kind: viscous, along: all}, FS: {kind: coulomb, along: all}}
+"""
+
+
+def pendulum_record(model) -> runtime.Record:
+    t = np.arange(5000)[:, None] / 500
+    q = 1.2 * np.sin(2 * t) + 0.5 * np.sin(5 * t)
+    qd = 2.4 * np.cos(2 * t) + 2.5 * np.cos(5 * t)
+    qdd = -4.8 * np.sin(2 * t) - 12.5 * np.sin(5 * t)
+    chi = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0) | {"ZZ1": 0.5, "MX1": 1.0, "M1": 3.0, "FV1": 0.5, "FS1": 0.4}
+    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(chi))
+    return runtime.Record(t[:, 0], q, tau + 0.02 * tau.std() * np.random.default_rng(0).standard_normal(tau.shape))
+
+
+def test_changes_that_no_fit_can_tell_are_found_by_computing_and_by_blocks_alike() -> None:
+    """One pendulum: every change of frame or sense, since another ZZ1, MX1, MY1 does the same; a factor of all torques; not a unit of angle."""
+    robot = parse_robot(PENDULUM, "pendulum")
+    model, free = symgen.model(robot), symgen.variants(robot)
+    record = pendulum_record(model)
+    found = runtime.plausibility(model, record, variants=free)
+    assert found.worst is None
+    assert {
+        "gravity has the wrong sign: it points along +y0",
+        "gravity points along +x0",
+        "joint 1 counts in the other sense, position and torque",
+        "the zero of joint 1",
+        "a common factor of all torques",
+        "r of frame 1",
+    } <= set(found.equivalent)
+    assert not any("degrees" in text or "torque of joint 1" in text or "+z0" in text for text in found.equivalent)
+    assert runtime.plausibility(model, RecordStream(record, 512), variants=free).equivalent == found.equivalent
+
+
+def test_excerpts_of_a_long_stream_are_spread_over_its_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    t = np.arange(5000) / 500
+    monkeypatch.setattr(samples_module, "EXCERPTS", (3, 400))
+    parts = excerpts(RecordStream(runtime.Record(t, t, t**2), 777), study_from_mapping({"rows": {"window": [1.0, 9.0]}}))
+    assert [len(part) for part in parts] == [400] * 3
+    assert parts[0].t[0] == pytest.approx(1.0) and parts[2].t[-1] == pytest.approx(9.0)
+    assert all(np.allclose(part.tau[:, 0], part.q[:, 0] ** 2) and np.allclose(np.diff(part.t), 0.002) for part in parts)
+
+
+def test_loops_that_do_not_close_in_the_record_are_the_finding() -> None:
+    model = symgen.model("five_bar")
+    t = np.arange(4000) / 500
+    q = np.column_stack([0.8 + 0.1 * np.sin(3 * t), 2.0 + 0.1 * np.sin(2 * t)])  # cranks exchanged
+    found = runtime.plausibility(model, runtime.Record(t, q, np.cos(q)))
+    assert found.worst is not None and "loops close" in found.worst.question and "does not close" in found.worst.finding
 
 
 def test_too_few_samples_are_not_judged(right: slips.Case) -> None:
