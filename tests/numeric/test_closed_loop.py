@@ -363,3 +363,6 @@ def test_a_fit_survives_a_validation_that_fails(arm, clean, monkeypatch):
     assert result.estimate.status == "ok" and result.usable
     assert any("validation of essential parameters" in text for text in result.missing)
     assert any(p.columns == "all" and not p.fitted for p in result.validation[0].predictions)
+    stopped = identify(model, record, replace(study, estimate=EstimateSettings("didim", options={"passes": 1})), simulator=simulator)
+    assert stopped.estimate.status == "not-converged" and stopped.verdict.startswith(f"No values of {model.NAME}")
+    assert stopped.validation == () and "validation: didim ended with status not-converged" in stopped.missing
