@@ -153,6 +153,19 @@ class CompiledModel:
             if not np.abs(result - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
                 raise NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
 
+    def signal_rows(self, q: Array, qd: Array, qdd: Array, out: Array, **constants: float) -> Array:
+        """The distinct signals of the regressor, shape (signals.count, N), in `out`, a float64 array in C order."""
+        states = [np.ascontiguousarray(x.T) for x in self._states("regressor", (q, qd, qdd))]
+        N = states[0].shape[1]
+        if out.shape != (self.signals.count, N) or out.dtype != np.float64 or not out.flags.c_contiguous:
+            raise InputError(f"out {out.dtype} {out.shape}; expected float64 {(self.signals.count, N)} in C order")
+        inputs = [ctypes.c_void_p(x.ctypes.data) for x in states]
+        values, length = self._constants("signals", constants), ctypes.c_int64(N)
+        others = ctypes.c_void_p(values.ctypes.data), ctypes.c_void_p(out.ctypes.data)
+        if status := getattr(self._library, f"{self.module.NAME}_signals")(length, *inputs, length, *others, length):
+            raise InputError(f"{self.module.NAME}: signals in C refused its arguments with {status}")
+        return out
+
     def signals_alone(self, wanted: Sequence[int]) -> SignalTable:
         """The table of signals, whose function fills the rows `wanted` alone, in the same bits; `signals` where they cannot be compiled."""
         text = narrowed_source(self.source.decode(), wanted).encode()
@@ -196,12 +209,7 @@ class CompiledModel:
         return states
 
     def _call(self, name: str, inputs: Sequence[Array], constants: Mapping[str, float], result: Array) -> None:
-        unknown = set(constants) - set(self.module.CONSTANTS)
-        if unknown:
-            raise TypeError(
-                f"{name}() got unexpected keywords {sorted(unknown)}; constants are {', '.join(self.module.CONSTANTS) or 'none'}"
-            )
-        values = np.array([*{**self.module.CONSTANTS, **constants}.values()] or [0.0], dtype=float)
+        values = self._constants(name, constants)
         if not (result.flags.c_contiguous and result.flags.aligned and result.flags.writeable and result.dtype == np.float64):
             raise InputError(f"{self.module.NAME}: the store is not a writeable float64 array in C order")
         stream = result.nbytes > self._large
@@ -209,6 +217,15 @@ class CompiledModel:
         status = getattr(self._library, f"{self.module.NAME}_{name}")(ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream))
         if status:
             raise InputError(f"{self.module.NAME}: {name} in C refused its arguments with {status}")
+
+    def _constants(self, name: str, constants: Mapping[str, float]) -> Array:
+        """Values of CONSTANTS in their order, those given in place of the robot file's."""
+        unknown = set(constants) - set(self.module.CONSTANTS)
+        if unknown:
+            raise TypeError(
+                f"{name}() got unexpected keywords {sorted(unknown)}; constants are {', '.join(self.module.CONSTANTS) or 'none'}"
+            )
+        return np.array([*{**self.module.CONSTANTS, **constants}.values()] or [0.0], dtype=float)
 
 
 @dataclass(frozen=True)

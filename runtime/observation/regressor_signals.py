@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from runtime.model.compiled import CompiledModel
 from runtime.model.generated import GeneratedModel
 from runtime.observation.decimation import Decimation, Plan
 from runtime.observation.filters import States, decimation_plan
@@ -18,7 +19,7 @@ from runtime.settings.study import Decimate
 
 Array = np.ndarray
 
-BLOCK = 8192  # samples evaluated at a time: few calls, rows of 64 kB that stay in cache
+BLOCK = 4096  # samples evaluated at a time: those that an emitted module takes at once, whose rows stay in cache
 PROBES = 64  # random states that tell signals apart
 
 
@@ -63,16 +64,30 @@ class DistinctSignals:
     def __init__(self, model: GeneratedModel, entries: Entries, constants: Mapping[str, float]) -> None:
         self.model, self.constants = model, constants
         self.rows = (entries.k * len(model.JOINTS) + entries.j)[entries.source]
+        self.numbers = _numbers(model, entries) if isinstance(model, CompiledModel) else np.arange(0)
         self._room: dict[int, tuple[Array, Array]] = {}  # by number of samples: store, signals
 
     def __call__(self, states: States) -> Array:
         """Signals of the states (B, n), shape (S, B)."""
         B = len(states)
+        if isinstance(self.model, CompiledModel):
+            return self._in_c(self.model, states)
         if B not in self._room:
             self._room[B] = self.model.store(B), np.empty((len(self.rows), B))
         out, signals = self._room[B]
         D = self.model.regressor(states.q, states.qd, states.qdd, out=out, **self.constants)
         return np.take(D.transpose(2, 1, 0).reshape(-1, B), self.rows, axis=0, out=signals, mode="clip")
+
+    def _in_c(self, model: CompiledModel, states: States) -> Array:
+        """The same from a compiled model, which gives them without a store."""
+        B = len(states)
+        if B not in self._room:
+            self._room[B] = np.empty((model.signals.count, B)), np.empty((len(self.rows), B))
+        every, signals = self._room[B]
+        model.signal_rows(states.q, states.qd, states.qdd, every, **self.constants)
+        return (
+            every if np.array_equal(self.numbers, np.arange(len(every))) else np.take(every, self.numbers, axis=0, out=signals, mode="clip")
+        )
 
 
 class DecimatedSignals:
@@ -99,6 +114,8 @@ def distinct_entries(model: GeneratedModel, constants: Mapping[str, float], colu
     states are out of reach (loops that do not close), every entry stands for itself.
     """
     columns = np.arange(len(model.BASE_PARAMETERS)) if columns is None else columns
+    if isinstance(model, CompiledModel):
+        return _entries_in_c(model, columns)
     row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])
     k = columns[row]
     values = _probed(model, constants)[k, j]
@@ -109,6 +126,25 @@ def distinct_entries(model: GeneratedModel, constants: Mapping[str, float], colu
     _, source, which = np.unique(sign[:, None] * values + 0.0, axis=0, return_index=True, return_inverse=True)
     which = which.reshape(-1)
     return Entries(row, k, j, which, sign * sign[source][which], source)
+
+
+def _entries_in_c(model: CompiledModel, columns: Array) -> Entries:
+    """The same of a compiled model, whose C file says which entries are equal."""
+    table = model.signals
+    order = np.argsort(columns)
+    place = np.searchsorted(columns[order], table.column).clip(max=len(columns) - 1)
+    wanted = np.flatnonzero(columns[order][place] == table.column)
+    _, source, which = np.unique(table.signal[wanted], return_index=True, return_inverse=True)
+    return Entries(
+        order[place[wanted]], table.column[wanted], table.row[wanted], which.reshape(-1), table.sign[wanted].astype(float), source
+    )
+
+
+def _numbers(model: CompiledModel, entries: Entries) -> Array:
+    """Number of each signal in the C file."""
+    table, n = model.signals, len(model.JOINTS)
+    number = dict(zip((table.column * n + table.row).tolist(), table.signal.tolist(), strict=True))
+    return np.array([number[place] for place in (entries.k * n + entries.j)[entries.source].tolist()], dtype=np.intp)
 
 
 def _probed(model: GeneratedModel, constants: Mapping[str, float]) -> Array:

@@ -19,7 +19,10 @@ from runtime import load_model
 from runtime.errors import InputError
 from runtime.model.compiled import CompiledModel, FallbackWarning, cache_folder, compiled_model
 from runtime.model.generated import GeneratedModel
+from runtime.observation.filters import States
+from runtime.observation.regressor_signals import decimated_columns
 from runtime.resolution.c.kernels import SignalEntries
+from runtime.settings.study import Decimate
 from symgen.description import load_robot, parse_robot
 from symgen.emit.generate import generate_files
 
@@ -184,6 +187,18 @@ def test_signals_alone(model: GeneratedModel, warm: Path, tmp_path: Path) -> Non
     assert np.array_equal(every[wanted], some[wanted]) and np.isnan(np.delete(some, wanted, axis=0)).all()
     few = SignalEntries(c, model.BASE_PARAMETERS[-2:])  # what a study of two columns evaluates
     assert len(few.wanted) < c.signals.count and few.table.address != c.signals.address
+
+
+@needs_compiler
+@pytest.mark.parametrize("changed", [False, True])
+def test_decimated_columns_of_both(model: GeneratedModel, warm: Path, changed: bool) -> None:
+    """W of signals that C gives without a store, all columns and some in another order, with the constants of the file and with one changed."""
+    constants = {next(iter(model.CONSTANTS)): 0.7} if changed else {}
+    given, c = States(*states(903)), in_c(model, warm)
+    for columns in (None, [3, 0, len(model.BASE_PARAMETERS) - 1]):
+        for factor, how in ((4, Decimate(factor=4)), (1, None)):
+            found, expected = (decimated_columns(m, given, factor, how, constants, columns) for m in (c, model))
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
 @needs_compiler
