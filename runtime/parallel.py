@@ -10,7 +10,6 @@ scheduler you name. Numbers are those of one process in every bit on one kind of
 
 from __future__ import annotations
 
-import asyncio
 import os
 import signal
 import threading
@@ -147,6 +146,8 @@ def _environment(values: dict[str, str]) -> Iterator[None]:
 @contextmanager
 def _client(scheduler: str, timeout: float) -> Iterator[Any]:
     """A connection to a scheduler that has workers with our versions."""
+    import asyncio
+
     try:
         from distributed import Client
     except ImportError as e:
@@ -166,9 +167,11 @@ def _client(scheduler: str, timeout: float) -> Iterator[Any]:
 
 async def _shake_hands(scheduler: str, timeout: float) -> None:
     """Connect once: something that listens and never answers would keep a Client waiting for ever."""
+    from asyncio import wait_for
+
     from distributed.comm import connect
 
-    comm = await asyncio.wait_for(connect(scheduler, timeout=timeout), timeout)
+    comm = await wait_for(connect(scheduler, timeout=timeout), timeout)
     await comm.close()
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Collection
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
@@ -34,13 +35,17 @@ def narrowed(model: GeneratedModel, entries: Collection[tuple[int, int]]) -> Gen
     entries : collection of (int, int)
         Column k and joint j of each entry D[k, j] wanted, shape (b, n).
     """
-    if not isinstance(model, ModuleType):
-        return model
+    return _narrowed(model, frozenset(entries)) if isinstance(model, ModuleType) else model
+
+
+@lru_cache(maxsize=8)
+def _narrowed(model: ModuleType, entries: frozenset[tuple[int, int]]) -> GeneratedModel:
+    """`narrowed`, compiled once for the studies of a process that have the same columns."""
     source = getattr(model.__loader__, "get_source", None)
     tree = ast.parse(source(model.__name__) if source else "")
     block = next((node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == BLOCK), None)
     if block is None:
-        return model
+        return cast(GeneratedModel, model)
     block.body = _needed(block.body, {f"D[{k}, {j}]" for k, j in entries})
     return cast(GeneratedModel, run(ast.unparse(tree), Path(str(model.__file__))))
 

@@ -23,8 +23,9 @@ import numpy as np
 from runtime.model.casadi import SymbolicModel
 from runtime.model.compile_cache import FallbackWarning, NotCompiledError, cache_folder, shared_object
 from runtime.motion.control_law import VECTORS
-from runtime.motion.dry_friction import DryFriction, event_function, friction_function, kinetic, rest_function
+from runtime.motion.dry_friction import DryFriction
 from runtime.motion.result import REST
+from runtime.motion.stick_slip import event_function, friction_function, kinetic, rest_function
 
 Array = np.ndarray
 MX = Any  # casadi.MX

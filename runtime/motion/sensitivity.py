@@ -28,8 +28,9 @@ from runtime.motion.controller_tick import (
     round_function,
     sliding_friction,
 )
-from runtime.motion.dry_friction import DryFriction, friction_function, rest_function, solve
+from runtime.motion.dry_friction import DryFriction
 from runtime.motion.result import REST, Sensitivity
+from runtime.motion.stick_slip import friction_function, rest_function, solve
 
 Array = np.ndarray
 MX = Any  # casadi.MX

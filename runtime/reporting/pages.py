@@ -10,7 +10,7 @@ from runtime.reporting.friction import friction_section
 from runtime.reporting.page import Page, Section
 from runtime.reporting.payload import payload_section
 from runtime.reporting.physical import physical_section
-from runtime.reporting.resolution import level_numbers, resolution_section, resolution_verdict
+from runtime.reporting.resolution import level_numbers, resolution_section
 from runtime.reporting.resolution_advice import advice_section
 from runtime.reporting.sections import identification_sections
 from runtime.resolution.advice import Advice
@@ -82,7 +82,7 @@ def resolution_page(result: Cestac, study: str) -> Page:
     """The page of a resolution study; study : text of study.yaml."""
     return Page(
         title=f"{_robot(result)}: encoder resolution on {_records(result)}",
-        verdict=resolution_verdict(result),
+        verdict=result.message,
         sections=[resolution_section(result), settings_section(study)],
         numbers=level_numbers(result),
     )

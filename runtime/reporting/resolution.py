@@ -40,24 +40,3 @@ def level_numbers(result: Cestac) -> list[Number]:
     """The verdict of every step, for the head of a page."""
     states: dict[str, State] = {"unbiased": "good", "doubtful": "doubtful", "biased": "no"}
     return [Number(r.level.label, r.verdict, states[r.verdict]) for r in result.levels]
-
-
-def resolution_text(result: Cestac) -> str:
-    """Means and residuals as Table 3, then %e (%sigma), then the verdict in one sentence."""
-    return f"{result.to_table()}\n\n{resolution_verdict(result)}"
-
-
-def resolution_verdict(result: Cestac) -> str:
-    """The verdict of every step, in one sentence."""
-    by_verdict: dict[str, list[str]] = {}
-    for level in result.levels:
-        by_verdict.setdefault(level.verdict, []).append(level.level.label)
-    meaning = {"unbiased": "practically unbiased", "doubtful": "doubtful", "biased": "biased"}
-    parts = [f"{meaning[verdict]} at {', '.join(labels)}" for verdict, labels in by_verdict.items()]
-    worst = max(result.levels, key=lambda level: max(level.decided_by.values(), default=0.0), default=None)
-    if worst is None:
-        return "Nothing was perturbed."
-    name, error = next(iter(worst.decided_by.items()))
-    change = f"{'the residual' if name == 'rho' else name}, {error:.1f} % at {worst.level.label}"
-    method = "Least squares" if result.estimator == "LS" else result.estimator
-    return f"{method} is {'; '.join(parts)}; largest change: {change}."

@@ -20,6 +20,7 @@ is large do not decide; the result says which ones did. Section 4.1.4 calls the 
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -165,6 +166,22 @@ class Cestac:
         )
 
     @property
+    def message(self) -> str:
+        """The verdict of every step, in one sentence."""
+        by_verdict: dict[str, list[str]] = {}
+        for level in self.levels:
+            by_verdict.setdefault(level.verdict, []).append(level.level.label)
+        meaning = {"unbiased": "practically unbiased", "doubtful": "doubtful", "biased": "biased"}
+        parts = [f"{meaning[verdict]} at {', '.join(labels)}" for verdict, labels in by_verdict.items()]
+        worst = max(self.levels, key=lambda level: max(level.decided_by.values(), default=0.0), default=None)
+        if worst is None:
+            return "Nothing was perturbed."
+        name, error = next(iter(worst.decided_by.items()))
+        change = f"{'the residual' if name == 'rho' else name}, {error:.1f} % at {worst.level.label}"
+        method = "Least squares" if self.estimator == "LS" else self.estimator
+        return f"{method} is {'; '.join(parts)}; largest change: {change}."
+
+    @property
     def estimator(self) -> str:
         """Name of the method in tables: LS for least squares, whatever its weights."""
         return "LS" if self.reference.method in LINEAR else self.reference.method.upper()
@@ -306,9 +323,9 @@ def level_result(level: Level, runs: Runs, measured: Observation, reference: Est
 
 def runs_needed(spread: float) -> int:
     """Fewest runs whose Student interval of the mean is narrower than NEGLIGIBLE on either side; spread : 100 sigma / |X_LS|."""
-    N = np.arange(2, MOST_RUNS + 1)
-    enough = stdtrit(N - 1, (1 + CONFIDENCE) / 2) * spread / np.sqrt(N) < NEGLIGIBLE
-    return int(N[np.argmax(enough)]) if enough.any() else MOST_RUNS
+    return 2 + bisect_left(
+        range(2, MOST_RUNS), True, key=lambda N: bool(stdtrit(N - 1, (1 + CONFIDENCE) / 2) * spread / np.sqrt(N) < NEGLIGIBLE)
+    )
 
 
 def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:

@@ -71,7 +71,6 @@ def cestac(
     with reported_errors(), reserved(output) as results:
         import runtime
         from runtime.records.reading import read_records
-        from runtime.reporting.resolution import resolution_text
         from runtime.resolution.checkpoint import Checkpoint
 
         model = session.model_of(robot, "numpy" if advise else target)
@@ -98,7 +97,7 @@ def cestac(
                 else:
                     where: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint}
                     result = resolution = runtime.cestac(model, records, study, progress=progress, **where)
-                    text, negative = resolution_text(resolution), resolution.verdict == "biased"
+                    text, negative = f"{resolution.to_table()}\n\n{resolution.message}", resolution.verdict == "biased"
         except KeyboardInterrupt:
             session.stopped(checkpoint)
         if results is not None:

@@ -22,6 +22,7 @@ import runtime
 import symgen
 from runtime import Cestac, Estimate, Identification, Record, Study
 from runtime.errors import DataUnavailableError
+from runtime.estimators.essential import Essential
 from runtime.identification.coupling import recoupled
 from runtime.identification.identification import feasibility_of
 from runtime.markup import number
@@ -78,8 +79,8 @@ class Demonstration:
         At more position steps, and with the torque steps of Table 4; None in the quick form.
     combinations : mapping of str to Cestac
         Other choices in the resolution study, by label; empty in the quick form.
-    variants : mapping of str to (Estimate, Estimate)
-        All and essential parameters under other treatments of the record, by label; empty in the quick form.
+    variants : mapping of str to Essential
+        All and essential parameters of this report, then under other treatments of the record, by label; empty in the quick form.
     """
 
     prepared: Prepared
@@ -88,7 +89,7 @@ class Demonstration:
     curve: Cestac | None
     torque: Cestac | None
     combinations: Mapping[str, Cestac]
-    variants: Mapping[str, tuple[Estimate, Estimate]]
+    variants: Mapping[str, Essential]
 
     @property
     def simulated(self) -> bool:
@@ -163,7 +164,8 @@ def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], No
         progress(label)
         combinations[label] = resolution(changed, **settings)
     progress("other treatments of the record")
-    return Demonstration(prepared, result, main, curve, torque, combinations, _variants(replace(prepared, study=study)))
+    variants = {"as in this report": result.essential, **_variants(replace(prepared, study=study))}
+    return Demonstration(prepared, result, main, curve, torque, combinations, variants)
 
 
 def recorded_step(record: Record) -> float:
@@ -185,14 +187,13 @@ def _combinations(study: Study, b: int) -> list[tuple[str, Study, dict[str, Any]
     ]
 
 
-def _variants(prepared: Prepared) -> dict[str, tuple[Estimate, Estimate]]:
-    """(all, essential) estimates under other treatments of the same record, one changed at a time."""
+def _variants(prepared: Prepared) -> dict[str, Essential]:
+    """All and essential parameters under other treatments of the same record, one changed at a time."""
     model, study, record = prepared.model, prepared.study, prepared.record
     slow = tuple(SLOW * float(limit) for limit in model.LIMITS["qd"])
     slower = tuple(3 * limit for limit in slow)
     t1 = float(record.t[-1])
     choices: dict[str, tuple[Study, Record]] = {
-        "as in this report": (study, record),
         f"rows below {SLOW:.0%} of top speed left out": (replace(study, rows=replace(study.rows, low_speed=slow)), record),
         f"rows below {3 * SLOW:.0%} of top speed left out": (replace(study, rows=replace(study.rows, low_speed=slower)), record),
         "whole record, rest included": (replace(study, rows=replace(study.rows, window=(0.0, t1))), record),
@@ -204,11 +205,7 @@ def _variants(prepared: Prepared) -> dict[str, tuple[Estimate, Estimate]]:
     if model.DRIVES is not None:
         drives = Drives.from_mapping(model.DRIVES)
         choices["drives without coupling"] = (study, recoupled(record, drives, drives.decoupled("none")))
-    fits = {}
-    for label, (changed, treated) in choices.items():
-        both = runtime.essential(model, treated, changed)
-        fits[label] = (both.all_parameters, both.estimate)
-    return fits
+    return {label: runtime.essential(model, treated, changed) for label, (changed, treated) in choices.items()}
 
 
 def _faster(study: Study) -> Study:
@@ -280,12 +277,13 @@ def _table_2(demo: Demonstration) -> Section:
 def _treatments(demo: Demonstration) -> Section:
     """How the parameters that differ move when the same record is treated otherwise."""
     rows = []
-    for label, (fit, kept) in demo.variants.items():
-        rows.append((label, f"{fit.relative_error:.2f}", str(len(kept.names)), *(number(fit[name], ".4g") for name in SHOWN)))
+    for label, variant in demo.variants.items():
+        fit = variant.all_parameters
+        rows.append((label, f"{fit.relative_error:.2f}", str(len(variant.names)), *(number(fit[name], ".4g") for name in SHOWN)))
     reference = ("Table 2", "-", "28", *(number(chapter.TABLE_2.get(name, math.nan)) for name in SHOWN))
     header = ("treatment", "error %", "essential", *SHOWN)
-    base = next(iter(demo.variants.values()))[0]
-    slow, late = (list(demo.variants.values())[k][0] for k in (2, 7))
+    fits = [variant.all_parameters for variant in demo.variants.values()]
+    base, slow, late = fits[0], fits[2], fits[7]
     text = () if demo.simulated else (
         "What differs from Table 2, and why. Dry friction depends on how low speed is treated: where a joint turns round or rests, the filters "
         "round sign(qd) off and it takes a sign the arm did not feel, which lowers every FS. Leaving those rows out raises FS5 from "

@@ -15,11 +15,12 @@ from runtime.errors import SettingsError
 from runtime.model.casadi import load_symbolic
 from runtime.motion.control_law import control_law, discrete_poles
 from runtime.motion.controller_tick import plant_function
-from runtime.motion.dry_friction import dry_friction, friction_function
+from runtime.motion.dry_friction import dry_friction
 from runtime.motion.reference import Reference, reference_of
 from runtime.motion.result import SimulationError
 from runtime.motion.simulation import Simulator, inertia_ratio, parameters_of
 from runtime.motion.simulation import simulate as simulate_study
+from runtime.motion.stick_slip import friction_function
 from runtime.observation.filters import filtered_states
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
