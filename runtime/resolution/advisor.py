@@ -35,6 +35,7 @@ from runtime.estimators.linear import assemble
 from runtime.estimators.methods import linear_system
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, drives_of, joint_units
+from runtime.model.narrowing import narrowed
 from runtime.observation.observation import stack
 from runtime.observation.position_errors import NormalEquations, Perturbation, perturbation
 from runtime.records.provenance import origin
@@ -151,9 +152,10 @@ def advise(
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
     decisive = [names.index(name) for name in deciding_names(reference)]
     every = range(len(model.JOINTS))
+    wanted = [(k, j) for k in map(model.BASE_PARAMETERS.index, names) for j in np.flatnonzero(np.asarray(model.STRUCTURE)[k]).tolist()]
     task = Task(
         tuple(prepared(model, record, study, drives) for record in records),
-        model,
+        narrowed(model, wanted),
         names,
         settings,
         study.cestac,
