@@ -1,12 +1,12 @@
-"""Growth of cost: time and memory against samples, joints and runs, as a log-log figure.
+"""Growth of cost: time and memory against samples, joints, columns, runs and workers, as a log-log figure.
 
     python benchmarks/growth.py [-o docs/growth.png] [--quick]
 
 Samples: the TX40 regressor into a reused store and the distinct signals through the decimation, by the NumPy and the C module; largest resident set of
 `symgen identify` with the whole record in memory and by blocks (memory.py). Joints, 2 to 30: revolute chains and binary trees with friction; generation
-from the robot file to the text of the module, the time of compiling C up to 12, and the regressor of each. Runs: a resolution study of the TX40 with 9000 samples.
+from the robot file to the text of the module, the time of compiling C up to 12, and the regressor of each. Runs, columns, workers: a resolution study of the TX40 with 9000 samples.
 
-One core, one BLAS thread, CPU time, the least of three after a warm-up. The least of three under an unknown load is good for slopes, which is what the figure is for; ratios
+One core, one BLAS thread, CPU time, the least of three after a warm-up; workers: every core, elapsed time. The least of three under an unknown load is good for slopes, which is what the figure is for; ratios
 between contenders are measured in interleaved rounds by the other files of this folder. The numbers of the figure are printed.
 """
 
@@ -44,6 +44,8 @@ SAMPLES = (1_000, 10_000, 100_000, 1_000_000)
 JOINTS = (2, 4, 6, 9, 12, 16, 20, 30)
 COMPILED = 12  # joints up to which C is compiled: chains of more take minutes
 RUNS = (4, 16, 64, 256)
+COLUMNS = (3, 6, 12, 24, 60)
+WORKERS = (1, 2, 4, 8)  # as many as there are cores
 Curves = dict[str, list[tuple[float, float]]]  # label: points
 
 
@@ -144,18 +146,44 @@ def by_joints(folder: Path, joints: tuple[int, ...], N: int = 4000) -> tuple[Cur
     return generation, speed
 
 
-def by_runs(models: dict[str, GeneratedModel], runs: tuple[int, ...]) -> Curves:
-    """Seconds of a resolution study."""
+def study_record() -> Record:
+    """The record of the resolution studies: a motion and random torques."""
     rng, N, n = np.random.default_rng(5), 9000, 6
     t = np.arange(N) / 5000
     w = 2 * np.pi * rng.uniform(0.3, 2.5, (5, n))
     q = (rng.uniform(-0.4, 0.4, (5, n)) * np.sin(w * t[:, None, None] + rng.uniform(0, 6, (5, n)))).sum(1)
-    record = Record(t=t, q=q, tau=rng.standard_normal((N, n)), rate=5000.0, name="motion")
+    return Record(t=t, q=q, tau=rng.standard_normal((N, n)), rate=5000.0, name="motion")
+
+
+def by_runs(models: dict[str, GeneratedModel], record: Record, runs: tuple[int, ...]) -> Curves:
+    """Seconds of a resolution study."""
     found: Curves = {}
     for label, model in models.items():
         for R in runs:
             study = Study(cestac=CestacSettings(delta=(1e-3,), runs=R, columns="all"))
             found.setdefault(label, []).append((R, least(lambda: cestac(model, record, study), 1)))  # noqa: B023
+    return found
+
+
+def by_columns(models: dict[str, GeneratedModel], record: Record, columns: tuple[int, ...], runs: int) -> Curves:
+    """Seconds of a resolution study of some columns, spread over all."""
+    found: Curves = {}
+    for label, model in models.items():
+        for b in columns:
+            own = np.linspace(0, len(model.BASE_PARAMETERS) - 1, b).round().astype(int)
+            study = Study(cestac=CestacSettings(delta=(1e-3,), runs=runs, columns=[model.BASE_PARAMETERS[k] for k in own]))
+            found.setdefault(label, []).append((b, least(lambda: cestac(model, record, study), 1)))  # noqa: B023
+    return found
+
+
+def by_workers(models: dict[str, GeneratedModel], record: Record, workers: tuple[int, ...], runs: int) -> Curves:
+    """Elapsed seconds of a resolution study by several processes, their start included."""
+    found: Curves = {}
+    for label, model in models.items():
+        for count in workers:
+            start = time.perf_counter()
+            cestac(model, record, Study(cestac=CestacSettings(delta=(1e-3,), runs=runs, columns="all")), workers=count)
+            found.setdefault(label, []).append((count, time.perf_counter() - start))
     return found
 
 
@@ -175,12 +203,14 @@ def panel(axes: object, curves: Curves, x: str, y: str) -> None:
         )  # type: ignore[attr-defined]
         print(f"  {label:32} exponent {exponent:5.2f}   " + "  ".join(f"{a:g}: {b:.3g}" for a, b in points))
     axes.set(xlabel=x, ylabel=y)  # type: ignore[attr-defined]
-    if x == "joints":
-        axes.set_xticks([2, 4, 8, 16, 30], ["2", "4", "8", "16", "30"])  # type: ignore[attr-defined]
+    if not x.startswith("samples"):
+        counts = [2, 4, 8, 16, 30] if x == "joints" else [count for count, _ in next(iter(curves.values()))]
+        axes.set_xticks(counts, list(map(str, counts)))  # type: ignore[attr-defined]
     for axis in (axes.xaxis, axes.yaxis):  # type: ignore[attr-defined]
         axis.set_minor_formatter(NullFormatter())
     axes.grid(True, which="major", lw=0.4, alpha=0.6)  # type: ignore[attr-defined]
-    axes.legend(fontsize=7, frameon=False, title="(exponent over the last three points)", title_fontsize=6.5)  # type: ignore[attr-defined]
+    title = f"(exponent over the last {min(3, max(map(len, curves.values())))} points)"
+    axes.legend(fontsize=7, frameon=False, title=title, title_fontsize=6.5)  # type: ignore[attr-defined]
 
 
 def main() -> None:
@@ -188,22 +218,30 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/growth.png"))
     parser.add_argument("--quick", action="store_true", help="few points, to see whether it runs")
     arguments = parser.parse_args()
-    samples, joints, runs = (SAMPLES[:2], (2, 6), RUNS[:2]) if arguments.quick else (SAMPLES, JOINTS, RUNS)
-    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    samples, joints, runs, columns = (SAMPLES[:3], (2, 6), RUNS[:2], COLUMNS[-3:]) if arguments.quick else (SAMPLES, JOINTS, RUNS, COLUMNS)
+    cores = os.sched_getaffinity(0)
+    workers = WORKERS[:2] if arguments.quick or len(cores) < 2 else tuple(count for count in WORKERS if count <= len(cores))
+    os.sched_setaffinity(0, {max(cores)})
     with TemporaryDirectory() as name:
         folder = Path(name)
         numpy_model, c = emitted("tx40", folder)
         models = {"NumPy": numpy_model} | ({"C": c} if c is not numpy_model else {})
         peaks = memory(folder, numpy_model, samples[1:])  # first: a process inherits the largest resident set of the one that starts it
-        figure = Figure(figsize=(11, 6.6), layout="constrained")
-        axes = figure.subplots(2, 3).ravel()
+        figure, record = Figure(figsize=(14.5, 6.6), layout="constrained"), study_record()
+        axes = figure.subplots(2, 4).ravel()
         panel(axes[0], by_samples(models, samples), "samples, TX40", "CPU time, s")
         panel(axes[1], peaks, "samples, TX40", "peak memory of an identification, MB")
-        panel(axes[2], by_runs(models, runs), "runs of 9000 samples, TX40", "CPU time of a resolution study, s")
+        panel(axes[2], by_runs(models, record, runs), "runs of 9000 samples, TX40", "CPU time of a resolution study, s")
+        panel(
+            axes[3], by_columns(models, record, columns, runs[-2]), f"columns, {runs[-2]} runs, TX40", "CPU time of a resolution study, s"
+        )
         generation, speed = by_joints(folder, joints)
-        panel(axes[3], {k: v for k, v in generation.items() if "C" not in k}, "joints", "CPU time of generation, s")
-        panel(axes[4], {k: v for k, v in generation.items() if "C" in k}, "joints", "CPU time of compiling C, s")
-        panel(axes[5], speed, "joints", "regressor, ns a sample")
+        panel(axes[4], {k: v for k, v in generation.items() if "C" not in k}, "joints", "CPU time of generation, s")
+        panel(axes[5], {k: v for k, v in generation.items() if "C" in k}, "joints", "CPU time of compiling C, s")
+        panel(axes[6], speed, "joints", "regressor, ns a sample")
+        os.sched_setaffinity(0, cores)
+        elapsed = by_workers(models, record, workers, runs[-1])
+        panel(axes[7], elapsed, f"workers, {len(cores)} cores, {runs[-1]} runs, TX40", "elapsed time of a resolution study, s")
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(arguments.output, dpi=130)
     print(f"\n{arguments.output}")

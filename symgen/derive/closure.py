@@ -57,6 +57,10 @@ class Closure:
     def is_trivial(self) -> bool:
         return not self.robot.passive
 
+    def formula(self, j: int) -> Expression:
+        """q_j by q of the independent joints."""
+        return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
+
     def turn(self, j: int) -> tuple[Turn, Expression]:
         """The angle of revolute joint j as whole multiples of independent angles plus a constant."""
         turn = []

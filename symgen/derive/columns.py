@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+import numpy as np
 
 from symgen.derive.elements import element_column
+from symgen.derive.exact import Array
 from symgen.derive.newton_euler import Motion
 from symgen.derive.regressor import Axes
 from symgen.derive.scalar import Scalar
@@ -20,6 +23,17 @@ def inertial_names(robot: Robot) -> dict[str, tuple[str, int]]:
 def element_names(robot: Robot) -> dict[str, tuple[Element, int]]:
     """{name: (element, key)}."""
     return {parameter(e.family, j): (e, j) for e in robot.elements for j in e.keys}
+
+
+def sampled_columns(motion: Motion, names: Sequence[str], count: int) -> Array:
+    """D of the parameters `names` at `count` states in floats, shape (actuated joints, count, len(names))."""
+    D = columns(motion, names)
+    return np.array(
+        [
+            np.stack([np.broadcast_to(np.asarray(D[name].get(j, 0), dtype=float), (count,)) for name in names], axis=-1)
+            for j in motion.robot.joints
+        ]
+    )
 
 
 def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]]:

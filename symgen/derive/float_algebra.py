@@ -1,4 +1,4 @@
-"""Algebras of numbers: q, qd, qdd of the joints are given by joint number. In floats, arrays of any one shape; other numbers in subclasses."""
+"""The algebra of floats: q, qd, qdd of the joints are given by joint number, arrays of any one shape."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from symgen.description.robot import Robot
 Array = np.ndarray[Any, Any]
 
 
-class NumberAlgebra(Unnamed):
-    """States of one kind of numbers.
+class FloatAlgebra(Unnamed):
+    """States in floats.
 
     Parameters
     ----------
@@ -25,17 +25,22 @@ class NumberAlgebra(Unnamed):
         Position, velocity and acceleration of each joint; rad or m and seconds.
     rate : mapping
         dq_u/dq_i of each tied joint u and actuated joint i.
+    constants : mapping
+        In place of those of the robot file.
     """
 
     def __init__(
         self,
         robot: Robot,
-        q: Mapping[int, Any],
-        qd: Mapping[int, Any] | None = None,
-        qdd: Mapping[int, Any] | None = None,
-        rate: Mapping[tuple[int, int], Any] | None = None,
+        q: Mapping[int, Array],
+        qd: Mapping[int, Array] | None = None,
+        qdd: Mapping[int, Array] | None = None,
+        rate: Mapping[tuple[int, int], Array] | None = None,
+        *,
+        constants: Mapping[str, float] | None = None,
     ) -> None:
         self.robot, self._q, self._qd, self._qdd, self._rate = robot, q, qd or {}, qdd or {}, rate or {}
+        self.constants = {**robot.constants, **(constants or {})}
 
     def constant(self, e: Expression) -> Scalar:
         c = e.constant
@@ -43,7 +48,7 @@ class NumberAlgebra(Unnamed):
 
     def value(self, e: Expression) -> Scalar:
         """A constant expression as a number."""
-        raise NotImplementedError
+        return e.value(self.constants)
 
     def angle(self, turn: Turn, offset: Expression) -> Scalar:
         """sum n_j q_j + offset."""
@@ -63,17 +68,6 @@ class NumberAlgebra(Unnamed):
 
     def rate(self, u: int, i: int) -> Scalar:
         return self._rate[u, i]
-
-
-class FloatAlgebra(NumberAlgebra):
-    """Floats; `constants` replace those of the robot file."""
-
-    def __init__(self, robot: Robot, *states: Mapping[Any, Array] | None, constants: Mapping[str, float] | None = None) -> None:
-        super().__init__(robot, *states)  # type: ignore[arg-type]
-        self.constants = {**robot.constants, **(constants or {})}
-
-    def value(self, e: Expression) -> Scalar:
-        return e.value(self.constants)
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
         angle = self.angle(turn, offset)

@@ -63,6 +63,16 @@ class Carrier:
     turn: Turn
 
 
+def axis_rotation(cg: Scalar, sg: Scalar, ca: Scalar, sa: Scalar) -> Matrix:
+    """A = Rot(z, gamma) Rot(x, alpha) by cosines and sines of gamma and alpha."""
+    return ((cg, -mul(sg, ca), mul(sg, sa)), (sg, mul(cg, ca), -mul(cg, sa)), (0, sa, ca))
+
+
+def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
+    """P_ij = b e3 + d A e1 + r A e3."""
+    return (add(mul(d, A[0][0]), mul(r, A[0][2])), add(mul(d, A[1][0]), mul(r, A[1][2])), add(b, mul(r, A[2][2])))
+
+
 class Geometry:
     """Rotations, positions and carriers of all frames of `robot`, over the scalars of `algebra`."""
 
@@ -79,7 +89,7 @@ class Geometry:
         algebra, j = self.algebra, f.j
         ca, sa = (algebra.name(algebra.constant(call(trig, f.alpha)), f"{trig[0].upper()}A{j}") for trig in ("cos", "sin"))
         cg, sg = (algebra.name(algebra.constant(call(trig, f.gamma)), f"{trig[0].upper()}G{j}") for trig in ("cos", "sin"))
-        A: Matrix = ((cg, -mul(sg, ca), mul(sg, sa)), (sg, mul(cg, ca), -mul(cg, sa)), (0, sa, ca))
+        A = axis_rotation(cg, sg, ca, sa)
         turn: Turn = ()
         offset = f.theta0
         if f.sigma == REVOLUTE:
@@ -92,7 +102,7 @@ class Geometry:
         b, d, r = algebra.constant(f.b), algebra.constant(f.d), algebra.constant(f.r0)
         if f.sigma == PRISMATIC:
             r = algebra.name(add(r, self.position(j)), f"r{j}")
-        self.P[j] = (add(mul(d, cg), mul(r, A[0][2])), add(mul(d, sg), mul(r, A[1][2])), add(b, mul(r, A[2][2])))
+        self.P[j] = displacement(A, b, d, r)
         if parallel and f.ant:
             inner = self.carrier[f.ant]
             turn, offset = _sum(self.turn[f.ant][0] + turn), self.turn[f.ant][1] + offset

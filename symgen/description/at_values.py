@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 from symgen.description.expression import PI, Expression, twelfths
-from symgen.description.robot import REVOLUTE, Robot
+from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
 K = TypeVar("K")
+Change: TypeAlias = Callable[[Expression], Expression]
 WITHIN = 1e-9  # rad, of a multiple of pi/12: rounding of 1.5707963267948966
 
 
@@ -30,21 +31,31 @@ def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> R
     Robot
         The same mechanism without these constants; base parameters and formulas are those that hold for these values alone.
     """
-    values = _numbers(robot) if values is None else values
+    replaced = _numbers(robot) if values is None else values
+
+    def substituted(e: Expression) -> Expression:
+        return e.substitute(replaced)
+
+    constants = {name: x for name, x in robot.constants.items() if name not in replaced}
+    return replace(mapped(robot, substituted, substituted), constants=constants)
+
+
+def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
+    """`robot` with `length` of its lengths, gravity, ratios and rows of elements, and `angle` of its angles."""
 
     def rows(table: Mapping[int, Mapping[K, Expression]]) -> dict[int, dict[K, Expression]]:
-        return {j: {i: g.substitute(values) for i, g in row.items()} for j, row in table.items()}
+        return {j: {i: length(g) for i, g in row.items()} for j, row in table.items()}
 
-    x, y, z = (e.substitute(values) for e in robot.gravity)
+    def frame(f: Frame) -> Frame:
+        return replace(f, b=length(f.b), d=length(f.d), r=length(f.r), gamma=angle(f.gamma), alpha=angle(f.alpha), theta=angle(f.theta))
+
+    x, y, z = map(length, robot.gravity)
     return replace(
         robot,
-        frames=tuple(
-            replace(f, **{k: getattr(f, k).substitute(values) for k in ("gamma", "b", "alpha", "d", "theta", "r")}) for f in robot.frames
-        ),
+        frames=tuple(map(frame, robot.frames)),
         gravity=(x, y, z),
         elements=tuple(replace(e, along=rows(e.along), form=rows(e.form)) for e in robot.elements),
-        constraints={j: e.substitute(values) for j, e in robot.constraints.items()},
-        constants={name: x for name, x in robot.constants.items() if name not in values},
+        constraints={j: (length if robot.frame(j).sigma == PRISMATIC else angle)(e) for j, e in robot.constraints.items()},
     )
 
 

@@ -9,7 +9,6 @@ from typing import Any
 from symgen.derive.columns import element_names
 from symgen.derive.loops import close
 from symgen.derive.names import FAMILIES
-from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.spec import WIDTH, ModuleSpec, unit
 from symgen.regroup.regrouping import Regrouping
@@ -110,10 +109,7 @@ def loop_lines(robot: Robot) -> list[str]:
     for j in robot.passive:
         if j in closure.tied:
             continue
-        total = closure.offset[j]
-        for i, g in closure.row[j].items():
-            total = total + g * Expression.symbol(f"q{i}")
-        lines.append(f"q{j} = {total}" + (" (declared)" if j in robot.constraints else ""))
+        lines.append(f"q{j} = {closure.formula(j)}" + (" (declared)" if j in robot.constraints else ""))
     if closure.tied:
         start = ", ".join(f"q{j} = {closure.start[j]:.4g}" for j in closure.independent)
         lines.append(f"q{', q'.join(map(str, closure.tied))} from the closure equations by Newton; assembly mode of {start}")

@@ -18,7 +18,7 @@ from itertools import combinations_with_replacement, product
 
 import numpy as np
 
-from symgen.derive.columns import columns, element_names, inertial_names
+from symgen.derive.columns import element_names, inertial_names, sampled_columns
 from symgen.derive.exact import Array
 from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
@@ -84,10 +84,7 @@ class FloatStates:
         bend = np.linalg.solve(J[..., n:], -B[..., None])[..., 0]
         qdd |= {u: sum((rates[:, a, k] * qdd[i] for k, i in enumerate(joints)), start=bend[:, a]) for a, u in enumerate(closure.tied)}
         rate = {(u, i): rates[:, a, k] for a, u in enumerate(closure.tied) for k, i in enumerate(joints)}
-        D = columns(Motion(Geometry(self.robot, FloatAlgebra(self.robot, q, qd, qdd, rate), closure)), names)
-        return np.stack(
-            [np.stack([np.broadcast_to(np.asarray(D[name].get(j, 0), dtype=float), (size,)) for name in names], axis=-1) for j in joints]
-        )
+        return sampled_columns(Motion(Geometry(self.robot, FloatAlgebra(self.robot, q, qd, qdd, rate), closure)), names, size)
 
     def _linearised(self, q: Mapping[int, Array]) -> tuple[Array, Array]:
         """Residuals (samples, m) and their derivatives by the independent joints (samples, m, n + m)."""

@@ -8,29 +8,18 @@ reconstruction. What is recognised is then checked at the numbers themselves (`c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from fractions import Fraction
-from typing import TypeVar
 
+from symgen.description.at_values import mapped
 from symgen.description.expression import Call, Expression, Number, call
-from symgen.description.robot import PRISMATIC, Robot
+from symgen.description.robot import Robot
 
-K = TypeVar("K")
 LARGEST_WHOLE = 12  # whole numbers up to here are counts (2, 4) rather than lengths
 
 
 def numbered(robot: Robot) -> Robot:
     """`robot` with the numbers of its lengths, gravity, ratios and element rows as `Number` atoms."""
-    frames = tuple(replace(f, b=kept(f.b), d=kept(f.d), r=kept(f.r)) for f in robot.frames)
-    constraints = {j: kept(e) if robot.frame(j).sigma == PRISMATIC else e for j, e in robot.constraints.items()}
-    elements = tuple(replace(e, along=_rows(e.along), form=_rows(e.form)) for e in robot.elements)
-    x, y, z = map(kept, robot.gravity)
-    return replace(robot, frames=frames, gravity=(x, y, z), constraints=constraints, elements=elements)
-
-
-def _rows(table: Mapping[int, Mapping[K, Expression]]) -> dict[int, dict[K, Expression]]:
-    return {j: {i: kept(g) for i, g in row.items()} for j, row in table.items()}
+    return mapped(robot, kept)
 
 
 def kept(e: Expression) -> Expression:

@@ -15,7 +15,8 @@ What reaches the base has no effect.
 
 from __future__ import annotations
 
-from symgen.derive.scalar import apply
+from symgen.derive.geometry import Rotation, axis_rotation, displacement
+from symgen.derive.scalar import Vector, apply
 from symgen.description.expression import ONE, ZERO, Expression, call
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, parameter
 
@@ -23,8 +24,6 @@ TENSOR = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), 
 FIRST = ("MX", "MY", "MZ")
 
 Combination = dict[str, Expression]  # {parameter: coefficient}
-Vec = tuple[Expression, Expression, Expression]
-Mat = tuple[Vec, Vec, Vec]
 Step = tuple[str, str, Expression]  # (from, into, coefficient): `into` receives coefficient * `from`
 
 
@@ -85,7 +84,9 @@ class Transfer:
 
 def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
     """{parameter of link j that goes: {(parameter, 1 if of link i else 0 of link j): coefficient}}."""
-    A, p = _rotation(f), _position(f)
+    cg, sg, ca, sa = (call(trig, e) for e in (f.gamma, f.alpha) for trig in ("cos", "sin"))
+    A = axis_rotation(cg, sg, ca, sa)
+    p = displacement(A, f.b, f.d, f.r0)
     relations: dict[str, dict[tuple[str, int], Expression]] = {}
     if f.sigma == REVOLUTE:
         a = apply(A, (ZERO, ZERO, ONE))
@@ -94,19 +95,19 @@ def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
         relations["MZ"] = _first(a) | _tensor(_steiner(p, a, 1))
         relations["M"] = {("M", 1): ONE} | _first(p) | _tensor(_steiner(p, p, 0))
         return relations
-    R = _product(A, _turn(f))
+    turned = Rotation(A, call("cos", f.theta0), call("sin", f.theta0))
+    R = [turned.up(e) for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]  # axes of frame j in frame i
     for name, (k, m) in TENSOR.items():
-        relations[name] = _tensor([[R[x][k] * R[y][m] + (R[x][m] * R[y][k] if k != m else ZERO) for y in range(3)] for x in range(3)])
+        relations[name] = _tensor([[R[k][x] * R[m][y] + (R[m][x] * R[k][y] if k != m else ZERO) for y in range(3)] for x in range(3)])
     if f.sigma == PRISMATIC:
         return relations
     for k, name in enumerate(FIRST):
-        u: Vec = (R[0][k], R[1][k], R[2][k])
-        relations[name] = _first(u) | _tensor(_steiner(p, u, 1))
+        relations[name] = _first(R[k]) | _tensor(_steiner(p, R[k], 1))
     relations["M"] = {("M", 1): ONE} | _first(p) | _tensor(_steiner(p, p, 0))
     return relations
 
 
-def _steiner(p: Vec, u: Vec, symmetric: int) -> list[list[Expression]]:
+def _steiner(p: Vector, u: Vector, symmetric: int) -> list[list[Expression]]:
     """(p.u) E - p u', or 2 (p.u) E - p u' - u p' if `symmetric`."""
     trace = (p[0] * u[0] + p[1] * u[1] + p[2] * u[2]) * (1 + symmetric)
     return [[(trace if k == m else ZERO) - p[k] * u[m] - (u[k] * p[m] if symmetric else ZERO) for m in range(3)] for k in range(3)]
@@ -116,29 +117,8 @@ def _tensor(J: list[list[Expression]]) -> dict[tuple[str, int], Expression]:
     return {(name, 1): J[k][m] for name, (k, m) in TENSOR.items() if J[k][m]}
 
 
-def _first(u: Vec) -> dict[tuple[str, int], Expression]:
+def _first(u: Vector) -> dict[tuple[str, int], Expression]:
     return {(name, 1): c for name, c in zip(FIRST, u, strict=True) if c}
-
-
-def _rotation(f: Frame) -> Mat:
-    """A = Rot(z, gamma) Rot(x, alpha), cos**2 + sin**2 left as it is."""
-    ca, sa, cg, sg = (call(trig, e) for e in (f.alpha, f.gamma) for trig in ("cos", "sin"))
-    return ((cg, -sg * ca, sg * sa), (sg, cg * ca, -cg * sa), (ZERO, sa, ca))
-
-
-def _turn(f: Frame) -> Mat:
-    c, s = call("cos", f.theta0), call("sin", f.theta0)
-    return ((c, -s, ZERO), (s, c, ZERO), (ZERO, ZERO, ONE))
-
-
-def _position(f: Frame) -> Vec:
-    A = _rotation(f)
-    cg, sg = call("cos", f.gamma), call("sin", f.gamma)
-    return (f.d * cg + f.r0 * A[0][2], f.d * sg + f.r0 * A[1][2], f.b + f.r0 * A[2][2])
-
-
-def _product(A: Mat, B: Mat) -> Mat:
-    return tuple(tuple(A[k][0] * B[0][m] + A[k][1] * B[1][m] + A[k][2] * B[2][m] for m in range(3)) for k in range(3))  # type: ignore[return-value]
 
 
 __all__ = ["INERTIAL", "Step", "Transfer", "link_relations"]

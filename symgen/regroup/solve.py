@@ -23,7 +23,7 @@ from typing import Protocol
 import numpy as np
 
 from symgen.derive.angles import PI, Variable, fixed_angles, roots_of, units_of
-from symgen.derive.columns import columns
+from symgen.derive.columns import columns, sampled_columns
 from symgen.derive.exact import Array, Draw, Fp, primes_for
 from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
@@ -97,14 +97,8 @@ def numeric_coefficients(robot: Robot, name: str, support: Sequence[str]) -> lis
     rng = np.random.default_rng(43)
     count = states_for(robot, (*support, name))
     q, qd, qdd = (dict(zip(robot.moving, rng.uniform(-1, 1, (len(robot.moving), count)), strict=True)) for _ in range(3))
-    D = columns(Motion(Geometry(robot, FloatAlgebra(robot, q, qd, qdd), close(robot))), (*support, name))
-    W = np.stack(
-        [
-            np.concatenate([np.broadcast_to(np.asarray(D[k].get(j, 0), dtype=float), (count,)) for j in robot.joints])
-            for k in (*support, name)
-        ],
-        axis=-1,
-    )
+    motion = Motion(Geometry(robot, FloatAlgebra(robot, q, qd, qdd), close(robot)))
+    W = sampled_columns(motion, (*support, name), count).reshape(-1, len(support) + 1)
     size = np.linalg.norm(W[:, :-1], axis=0)
     return [Expression.number(repr(float(x))) for x in np.linalg.lstsq(W[:, :-1] / size, W[:, -1], rcond=None)[0] / size]
 

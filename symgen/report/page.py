@@ -133,10 +133,7 @@ def _relations(robot: Robot) -> list[tuple[MathML, str]]:
         if j in closure.tied:
             rows.append((mathml.math(left), texts[j]))
             continue
-        total = closure.offset[j]
-        for i, g in closure.row[j].items():
-            total = total + g * Expression.symbol(f"q{i}")
-        equation = mathml.element("mrow", left, mathml.element("mo", "="), mathml.expression(total))
+        equation = mathml.element("mrow", left, mathml.element("mo", "="), mathml.expression(closure.formula(j)))
         rows.append((mathml.math(equation), texts[j]))
     return rows
 

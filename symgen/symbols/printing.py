@@ -139,10 +139,7 @@ def passive_notes(model: SymbolicModel) -> list[str]:
     for j in robot.passive:
         if j in relations.tied:
             continue
-        total = relations.offset[j]
-        for i, g in relations.row[j].items():
-            total = total + g * Expression.symbol(f"q{i}")
-        lines.append(f"Passive joint: q{j} = {total}" + (", kept as a symbol." if j in closure.tied else "."))
+        lines.append(f"Passive joint: q{j} = {relations.formula(j)}" + (", kept as a symbol." if j in closure.tied else "."))
     if relations.tied:
         named = Names(len(robot.frames))
         u, i = relations.tied[0], robot.joints[0]

@@ -80,8 +80,8 @@ def apply(
     others = [name for name in physical.standard if name not in own and name not in _inertial(physical)]
     try:
         absent = [*others, *(name for name, x in stated.items() if not x)]
-        found = nearest(physical, links, stated | dict.fromkeys(others, 0.0), names, X, absent)
-        writing, source = Writing(text, found, own, _root(result, names)), Source(content)
+        closest = nearest(physical, links, stated | dict.fromkeys(others, 0.0), names, X, absent)
+        writing, source = Writing(text, closest, own, _root(result, names)), Source(content)
         rows = [*writing.links(source), *writing.joints(source)]
         new = source.edited()
         writing.require_read_back(read_text(new, path, nearly, part))
@@ -97,9 +97,9 @@ def apply(
         changes=tuple(row for row in rows if not same(row.before, row.after)),
         added=tuple(source.added),
         placeless=placeless,
-        placeless_sigma={name: writing.sigma(found.elements[name]) for name in placeless},
+        placeless_sigma={name: writing.sigma(closest.elements[name]) for name in placeless},
         joints={name: text.table.joint[own[name][1]].name for name in placeless if name in own},
-        spread=found.spread,
+        spread=closest.spread,
         undetermined=tuple(f"{row.place}: {row.number}" for row in rows if row.told_by == "file"),
         lost=tuple(lost),
     )

@@ -30,7 +30,7 @@ class Writing:
     ----------
     text : RobotText
         The file.
-    found : Nearest
+    nearest : Nearest
         What it is to say.
     own : mapping
         Family and joint of the elements that act along one joint, by name.
@@ -39,7 +39,7 @@ class Writing:
     """
 
     text: RobotText
-    found: Nearest
+    nearest: Nearest
     own: Mapping[str, tuple[str, int]]
     root: Array
 
@@ -47,13 +47,13 @@ class Writing:
         """Edit the links that change; one row for each number of every link."""
         rows, moved = [], []
         for link in self.text.links:
-            at = self.found.links[link.name]
-            place, ten = self.text.link(link), self.found.chi[at]
+            at = self.nearest.links[link.name]
+            place, ten = self.text.link(link), self.nearest.chi[at]
             if np.allclose(ten, link.ten, rtol=1e-13, atol=1e-15):
                 ten = link.ten
             else:
                 moved.append((place, ten))
-            rows += _link_rows(link, place, ten, self.found.gain[at], self.found.free[at], self.root)
+            rows += _link_rows(link, place, ten, self.nearest.gain[at], self.nearest.free[at], self.root)
         self.text.write_links(source, moved)
         return rows
 
@@ -62,42 +62,42 @@ class Writing:
         rows = []
         for j, joint in self.text.table.joint.items():
             mine = {
-                family: self.found.elements[name] for name, (family, i) in self.own.items() if i == j and self.text.attribute(family, j)
+                family: self.nearest.elements[name] for name, (family, i) in self.own.items() if i == j and self.text.attribute(family, j)
             }
-            self.text.set_joint(source, j, {family: float(self.found.chi[k]) for family, k in mine.items()})
+            self.text.set_joint(source, j, {family: float(self.nearest.chi[k]) for family, k in mine.items()})
             before, units = self.text.joint_values(j), SLIDING if joint.kind == "prismatic" else UNITS
             for family, k in mine.items():
-                told = "record" if np.abs(self.found.free[k]).max() < NO_SHARE else "sum"
-                numbers = (before[family], float(self.found.chi[k]), self.sigma(k))
+                told = "record" if np.abs(self.nearest.free[k]).max() < NO_SHARE else "sum"
+                numbers = (before[family], float(self.nearest.chi[k]), self.sigma(k))
                 rows.append(Change(f"joint {joint.name!a:.60}", str(self.text.attribute(family, j)), units[family], *numbers, told))
         return rows
 
     def sigma(self, k: int) -> float:
         """Deviation of parameter k."""
-        return float(np.linalg.norm(self.found.gain[k] @ self.root))
+        return float(np.linalg.norm(self.nearest.gain[k] @ self.root))
 
     @property
     def placeless(self) -> dict[str, float]:
         """Parameters that change and that the file has no place for."""
         return {
-            name: float(self.found.chi[k])
-            for name, k in self.found.elements.items()
-            if (name not in self.own or not self.text.attribute(*self.own[name])) and not same(self.found.chi[k], self.found.chi0[k])
+            name: float(self.nearest.chi[k])
+            for name, k in self.nearest.elements.items()
+            if (name not in self.own or not self.text.attribute(*self.own[name])) and not same(self.nearest.chi[k], self.nearest.chi0[k])
         }
 
     def require_read_back(self, again: RobotText) -> None:
         """Raise DescriptionError unless the written text, read `again`, says what was to be written."""
         for link in again.links:
-            wanted = self.found.chi[self.found.links[link.name]] if link.name in self.found.links else np.zeros(10)
+            wanted = self.nearest.chi[self.nearest.links[link.name]] if link.name in self.nearest.links else np.zeros(10)
             if np.abs(link.ten - wanted).max() > AGREE * max(float(np.abs(wanted).max()), AGREE):
                 raise DescriptionError(
                     f"link {link.name!a:.60} would be read with other values than written (compiler settings that bound inertia?)"
                 )
         for name, (family, j) in self.own.items():
-            attribute, wanted = self.text.attribute(family, j), self.found.chi[self.found.elements[name]]
+            attribute, wanted = self.text.attribute(family, j), self.nearest.chi[self.nearest.elements[name]]
             if attribute and abs(again.joint_values(j)[family] - wanted) > AGREE * max(1.0, abs(wanted)):
                 raise DescriptionError(f"joint {again.table.joint[j].name!a:.60} would be read with another {attribute} than written")
-        if len(again.links) != len(self.found.links):
+        if len(again.links) != len(self.nearest.links):
             raise DescriptionError("a link would be read without inertia; its mass becomes zero")
 
 

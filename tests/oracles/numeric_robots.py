@@ -13,6 +13,7 @@ import numpy as np
 
 from oracles.random_parallelograms import random_parallelogram
 from oracles.random_robots import random_robot
+from symgen.description.at_values import at_values
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.grammar import parse
 from symgen.description.robot import PRISMATIC, REVOLUTE, Element, Frame, Robot
@@ -54,22 +55,7 @@ def numbers_in(robot: Robot, rng: Generator, *, angles: bool) -> Robot:
         else:
             values[name] = _length(rng)
 
-    def put(e: Expression) -> Expression:
-        return e.substitute(values)
-
-    frames = tuple(replace(f, **{k: put(getattr(f, k)) for k in ("gamma", "b", "alpha", "d", "theta", "r")}) for f in robot.frames)
-    x, y, z = map(put, robot.gravity)
-    elements = tuple(
-        replace(
-            e,
-            along={j: {i: put(g) for i, g in row.items()} for j, row in e.along.items()},
-            form={j: {k: put(g) for k, g in row.items()} for j, row in e.form.items()},
-        )
-        for e in robot.elements
-    )
-    constants = {name: v for name, v in robot.constants.items() if name not in values}
-    constraints = {j: put(e) for j, e in robot.constraints.items()}
-    return replace(robot, frames=frames, gravity=(x, y, z), elements=elements, constants=constants, constraints=constraints)
+    return at_values(robot, values)
 
 
 def _length(rng: Generator) -> Expression:
