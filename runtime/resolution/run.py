@@ -48,7 +48,7 @@ def one_run(task: Task, key: tuple[int, int]) -> Run:
         return _estimated(work, key, level, draw)
     fused = task.loop is None and all(record.selection.signals.reader == "lowpass" for record in task.records)
     if task.estimate.method != "ols" or task.estimate.options or not fused:
-        system = linear_system(perturbed(work.model, work.task, level, draw), task.estimate)
+        system = linear_system(perturbed(work.wanted, work.task, level, draw), task.estimate)
         X = system.solve().X
         norms, method = np.array([joint.residual_norm(X) for joint in system.raw.joints]), TRIANGULAR
     else:
@@ -69,7 +69,7 @@ def _estimated(work: Workspace, key: tuple[int, int], level: Level, draw: tuple[
 
 
 class NumpyWorkspace:
-    """The workspace of an emitted module."""
+    """The workspace of an emitted module. narrowed, wanted : the module with the distinct signals of the columns alone, and with all their entries."""
 
     def __init__(self, task: Task, model: GeneratedModel) -> None:
         self.task, self.model = task, model
@@ -77,6 +77,7 @@ class NumpyWorkspace:
         self.entries = distinct_entries(model, task.constants, numbers)
         source = self.entries.source
         self.narrowed = narrowed(model, set(zip(self.entries.k[source].tolist(), self.entries.j[source].tolist(), strict=True)))
+        self.wanted = narrowed(model, set(zip(self.entries.k.tolist(), self.entries.j.tolist(), strict=True)))
         self.by_joint = [np.flatnonzero(self.entries.j == j) for j in range(len(model.JOINTS))]
         self.columns = [self.entries.row[own] for own in self.by_joint]
         self.records = [RecordWorkspace(self, record) for record in task.records]

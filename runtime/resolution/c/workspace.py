@@ -45,6 +45,11 @@ class CompiledWorkspace:
         self.two_point = task.settings.rounding == "two-point" and (task.settings.side == "joint" or task.drives is None)
 
     @property
+    def wanted(self) -> GeneratedModel:
+        """The same."""
+        return self.model
+
+    @property
     def model(self) -> GeneratedModel:
         """The model, its regressor in C."""
         return cast(GeneratedModel, self.compiled)
