@@ -126,7 +126,7 @@ class Problem:
         back = self.F @ np.linalg.inv(alternative.T)
         still = ~moving(alternative.states(self.samples)[1])
         mask = still @ (np.abs(back) > 1e-12).T == 0
-        return np.einsum("ij,kjp->kip", back, D), self.tau - self.samples.known @ back.T, mask
+        return back @ D, self.tau - self.samples.known @ back.T, mask
 
     @property
     def tau(self) -> Array:
