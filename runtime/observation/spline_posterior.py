@@ -55,7 +55,8 @@ class Basis:
         """Variances of the same, shape (n, m M); Z, shape (4, n, P)."""
         b = self.values[order]
         squares = np.stack([(1 if i == j else 2) * b[:, i] * b[:, j] for i, j in PAIRS])
-        return np.asarray((self._band(Z) @ squares).reshape(self.n, -1))
+        pairs = np.stack([Z[j - i][:, i : i + self.M] for i, j in PAIRS]).reshape(len(PAIRS), -1)
+        return np.asarray((pairs.T @ squares).reshape(self.n, -1))
 
     def jerk(self, c: Array) -> Array:
         """Jerk of every interval, shape (n, M)."""
@@ -96,10 +97,6 @@ class Basis:
         for i in range(4):
             g[:, i : i + self.M] += samples[i] - JERK[i] * prior
         return g
-
-    def _band(self, Z: Array) -> Array:
-        """Covariances of the pairs of coefficients of every interval, shape (n, M, 10)."""
-        return np.stack([Z[j - i][:, i : i + self.M] for i, j in PAIRS], axis=-1)
 
 
 def third_differences(c: Array) -> Array:
