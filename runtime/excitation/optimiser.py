@@ -19,6 +19,7 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.excitation.criteria import MotionLimits, Weights
+from runtime.excitation.result import Start
 from runtime.model.casadi import SymbolicModel, load_symbolic
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.families import Fourier
@@ -52,30 +53,6 @@ class Problem:
     limits: MotionLimits
     X: Array
     smooth: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Start:
-    """Result of one start.
-
-    Attributes
-    ----------
-    number : int
-    motion : dict
-        As a mapping.
-    criterion : float
-        Of the optimiser.
-    message : str
-        What the optimiser says at its end.
-    violation : float
-        Largest one of a constraint at the points of the grid, of its scale.
-    """
-
-    number: int
-    motion: dict[str, Any]
-    criterion: float
-    message: str
-    violation: float
 
 
 def one_start(problem: Problem, number: int) -> Start:

@@ -14,7 +14,7 @@ from runtime.reporting.page import Page, Section
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from runtime.excitation.search import Excitation
+    from runtime.excitation.result import Excitation
 
 LINES = ("-", "--", ":", "-.")
 

@@ -8,7 +8,7 @@ from functools import singledispatch
 from pathlib import Path
 from typing import TypeAlias
 
-from runtime.excitation.search import Excitation
+from runtime.excitation.result import Excitation
 from runtime.identification.compare import Ranking
 from runtime.identification.fleet import Fleet
 from runtime.identification.result import Identification
