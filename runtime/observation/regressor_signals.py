@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from runtime.errors import InputError
 from runtime.model.compiled import CompiledModel
 from runtime.model.generated import GeneratedModel
 from runtime.observation.decimation import Decimation, Plan
@@ -75,7 +76,10 @@ class DistinctSignals:
         if B not in self._room:
             self._room[B] = self.model.store(B), np.empty((len(self.rows), B))
         out, signals = self._room[B]
-        D = self.model.regressor(states.q, states.qd, states.qdd, out=out, **self.constants)
+        try:
+            D = self.model.regressor(states.q, states.qd, states.qdd, out=out, **self.constants)
+        except ValueError as e:  # what an emitted module of a general loop raises
+            raise InputError(f"{self.model.NAME}: {e}; look at units and zeros of the positions, and at the lengths of the robot file") from None
         return np.take(D.transpose(2, 1, 0).reshape(-1, B), self.rows, axis=0, out=signals, mode="clip")
 
     def _in_c(self, model: CompiledModel, states: States) -> Array:
