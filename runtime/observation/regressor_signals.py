@@ -79,7 +79,9 @@ class DistinctSignals:
         try:
             D = self.model.regressor(states.q, states.qd, states.qdd, out=out, **self.constants)
         except ValueError as e:  # what an emitted module of a general loop raises
-            raise InputError(f"{self.model.NAME}: {e}; look at units and zeros of the positions, and at the lengths of the robot file") from None
+            raise InputError(
+                f"{self.model.NAME}: {e}; look at units and zeros of the positions, and at the lengths of the robot file"
+            ) from None
         return np.take(D.transpose(2, 1, 0).reshape(-1, B), self.rows, axis=0, out=signals, mode="clip")
 
     def _in_c(self, model: CompiledModel, states: States) -> Array:

@@ -163,7 +163,7 @@ def test_loops_that_do_not_close_in_the_record_are_the_finding() -> None:
     q = np.column_stack([0.8 + 0.1 * np.sin(3 * t), 2.0 + 0.1 * np.sin(2 * t)])  # cranks exchanged
     found = runtime.plausibility(model, runtime.Record(t, q, np.cos(q)))
     assert found.worst is not None and "loops close" in found.worst.question and "does not close" in found.worst.finding
-    with pytest.raises(runtime.InputError, match="does not close at sample .*; look at units and zeros"):
+    with pytest.raises(runtime.InputError, match=r"does not close at sample .*; look at units and zeros"):
         runtime.identify(model, runtime.Record(t, q, np.cos(q)))
 
 
