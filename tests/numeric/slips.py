@@ -222,6 +222,18 @@ def _constants(case: Case, torque_constant: str) -> Case:
     return replace(case, robot=text)
 
 
+ANY_ROBOT = (
+    Slip(
+        5,
+        "joints in reverse order",
+        r"columns of positions and torques come in reverse order",
+        lambda c: replace(c, q=c.q[:, ::-1], tau=c.tau[:, ::-1]),
+    ),
+    Slip(6, "gravity with the wrong sign", GRAVITY, lambda c: c.text("[0, 0, -g]", "[0, 0, g]")),
+    Slip(7, "gravity along y", GRAVITY, lambda c: c.text("[0, 0, -g]", "[0, -g, 0]")),
+)
+"""Slips of every robot whose gravity is along -z."""
+
 KR300 = (
     Slip(1, "ratio of joint 3 negative", r"torque of joint 3 has the wrong sign|joint 3 counts", lambda c: c.text("757/3", "-757/3")),
     Slip(2, "degrees taken for rad", r"degrees", lambda c: replace(c, q=np.rad2deg(c.q))),
@@ -237,14 +249,7 @@ KR300 = (
         r"torque columns of joints 4 and 5",
         lambda c: replace(c, tau=columns(0, 1, 2, 4, 3, 5)(c.tau)),
     ),
-    Slip(
-        5,
-        "joints in reverse order",
-        r"columns of positions and torques come in reverse order",
-        lambda c: replace(c, q=c.q[:, ::-1], tau=c.tau[:, ::-1]),
-    ),
-    Slip(6, "gravity with the wrong sign", GRAVITY, lambda c: c.text("[0, 0, -g]", "[0, 0, g]")),
-    Slip(7, "gravity along y", GRAVITY, lambda c: c.text("[0, 0, -g]", "[0, -g, 0]")),
+    *ANY_ROBOT,
     Slip(
         8,
         "alpha of frame 4 with the wrong sign",
@@ -421,14 +426,7 @@ SIMULATED = (
     Slip(2, "motor angles in degrees", r"units\.q: deg", lambda c: replace(c, q=np.rad2deg(c.q))),
     Slip(3, "position columns 1 and 4 exchanged", r"position columns of joints 1 and 4", lambda c: replace(c, q=columns(3, 1, 2, 0)(c.q))),
     Slip(4, "torque columns 2 and 3 exchanged", r"torque columns of joints 2 and 3", lambda c: replace(c, tau=columns(0, 2, 1, 3)(c.tau))),
-    Slip(
-        5,
-        "joints in reverse order",
-        r"columns of positions and torques come in reverse order",
-        lambda c: replace(c, q=c.q[:, ::-1], tau=c.tau[:, ::-1]),
-    ),
-    Slip(6, "gravity with the wrong sign", GRAVITY, lambda c: c.text("[0, 0, -g]", "[0, 0, g]")),
-    Slip(7, "gravity along y", GRAVITY, lambda c: c.text("[0, 0, -g]", "[0, -g, 0]")),
+    *ANY_ROBOT,
     Slip(8, "alpha of frame 2 with the wrong sign", r"alpha of frame 2", lambda c: c.text("alpha: -pi/2", "alpha: pi/2")),
     Slip(9, "coupling of joints 2 and 3 forgotten", r"coupling of joints 2 and 3", _coupled),
     Slip(12, "rate 2000 for 500", r"sampling rate is [^;]*\b1/4\b", lambda c: replace(c, rate=4.0)),
