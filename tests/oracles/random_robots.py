@@ -162,7 +162,7 @@ def random_state(robot: Robot, samples: int, seed: int) -> tuple[Array, Array, A
 
 
 def random_parameters(robot: Robot, seed: int) -> Array:
-    """Standard parameters of links that could exist: masses at a few points; elements between 0.1 and 1. (p,)"""
+    """Standard parameters of links that could exist: masses at a few points; elements between 0.1 and 1, of a cross form a tenth of that: it stays positive. (p,)"""
     rng = np.random.default_rng([22, seed])
     value: dict[str, float] = {}
     for j in robot.links:
@@ -171,7 +171,8 @@ def random_parameters(robot: Robot, seed: int) -> Array:
         J, MS = np.trace(S) * np.eye(3) - S, m @ x
         elements = (*J[np.triu_indices(3)], *MS, m.sum())  # XX XY XZ YY YZ ZZ MX MY MZ M
         value |= {f"{p}{j}": v for p, v in zip(INERTIAL, elements, strict=True)}
-    return np.array([value.get(name, rng.uniform(0.1, 1.0)) for name in robot.parameters])
+    cross = {f"{element.family}{j}" for element in robot.elements for j in element.form}
+    return np.array([value.get(name, rng.uniform(0.1, 1.0) * (0.1 if name in cross else 1.0)) for name in robot.parameters])
 
 
 def describe_mix(sample: Iterable[Robot]) -> dict[str, float]:
