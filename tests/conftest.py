@@ -3,6 +3,7 @@
 Records: SYMGEN_DATA, the cache, then ../shared/data beside the repository; else the test is skipped, or fails where they are required.
 """
 
+import gc
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy loads: test processes would fight for the cores
@@ -15,6 +16,8 @@ from hypothesis import settings
 from runtime.errors import DataUnavailableError
 from runtime.records.datasets import DATASETS, fetch, locate
 
+# Expressions and syntax trees stay alive by the hundred thousand: looking at them again and again costs a tenth of the time.
+gc.set_threshold(200_000, 50, 100)
 settings.register_profile("symgen", derandomize=True, deadline=None)
 settings.load_profile("symgen")
 
