@@ -20,6 +20,8 @@ from runtime.settings.study import Study
 
 T = TypeVar("T")
 
+LONG = 10_000  # samples, from which on the runs of a resolution study take longer than getting a model in C
+
 
 def assess(
     model: GeneratedModel,
@@ -29,6 +31,7 @@ def assess(
     encoder: Sequence[float] = (),
     simulator: LoopSimulator | None = None,
     variants: GeneratedModel | None = None,
+    runs: Callable[[], GeneratedModel] | None = None,
     provenance: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda part: None,
 ) -> Identification:
@@ -39,6 +42,8 @@ def assess(
     model, records, study, simulator, variants, provenance : as for `identify`
     encoder : sequence of float
         Steps of the encoders in use, rad or m; judged like every other check.
+    runs : function, optional
+        Gives the same model for the runs of the resolution study, such as one in C; asked for records of LONG samples and more. Default: `model`.
     progress : function of str
         Called with the name of each part before it is computed.
 
@@ -78,7 +83,8 @@ def assess(
         return replace(result, missing=tuple(missing))
     study, names = result.study, result.essential.names
     columns = names if study.cestac.columns == "essential" else None
+    sampled = runs() if runs is not None and sum(len(record.t) for record in whole) >= LONG else model
     curves = attempt("friction", lambda: friction_curves(model, whole, study, result.estimate))
-    advice = attempt("resolution advice", lambda: advise(model, whole, study, columns=names, asked=tuple(encoder)))
-    resolution = attempt("resolution study", lambda: cestac(model, whole, study, columns=columns))
+    advice = attempt("resolution advice", lambda: advise(sampled, whole, study, columns=names, asked=tuple(encoder)))
+    resolution = attempt("resolution study", lambda: cestac(sampled, whole, study, columns=columns))
     return replace(result, friction=curves or (), advice=advice, resolution=resolution, missing=tuple(missing))

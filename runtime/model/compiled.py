@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -51,21 +51,30 @@ def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: 
     cache : Path, optional
         Folder of the compiled objects; default: `compile_cache.cache_folder`.
     """
+    return _compiled(CompiledModel, model, source, cache)
+
+
+def compiled_signals(model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None) -> GeneratedModel:
+    """`model` with the distinct signals of its regressor in C, all else in NumPy: half the time of compiling. Otherwise as `compiled_model`."""
+    return _compiled(CompiledSignals, model, source, cache)
+
+
+def _compiled(kind: type[CompiledSignals], model: GeneratedModel, source: Path | None, cache: Path | None) -> GeneratedModel:
     try:
         path = source or _beside(model)
-        text = _text(path)
-        folder = cache or cache_folder()
-        compiled = CompiledModel(model, shared_object(path, text, folder, lambda opened: _opened(opened, model, STATES)), text, folder)
+        text, folder = _text(path), cache or cache_folder()
+        library = shared_object(path, text, folder, lambda opened: _opened(opened, model, kind.FUNCTIONS), kind.OPTIONS)
+        compiled = kind(model, library, text, folder)
         compiled.check()
         return cast(GeneratedModel, compiled)
     except (NotCompiledError, OSError) as e:
-        warnings.warn(f"{model.NAME}: NumPy in place of C: {e}", FallbackWarning, stacklevel=2)
+        warnings.warn(f"{model.NAME}: NumPy in place of C: {e}", FallbackWarning, stacklevel=3)
         return model
 
 
 def target_of(model: GeneratedModel) -> str:
     """What computes: "c" for a compiled model, "numpy" for an emitted module."""
-    return "c" if isinstance(model, CompiledModel) else "numpy"
+    return "c" if isinstance(model, CompiledSignals) else "numpy"
 
 
 @dataclass(frozen=True)
@@ -98,19 +107,85 @@ class SignalTable:
     constant: Array
 
 
-class CompiledModel:
-    """The API of the generated module; what the C file lacks is that of the module. `module`: that module. `signals`: for other C code. `source`: the C file's text."""
+class CompiledSignals:
+    """The generated module `module`, the distinct signals of its regressor in C. `signals`: for other C code. `source`: the C file's text."""
+
+    FUNCTIONS: ClassVar[tuple[str, ...]] = ("signals",)
+    OPTIONS: ClassVar[tuple[str, ...]] = (*FLAGS, "-DSIGNALS_ONLY")
 
     def __init__(self, model: GeneratedModel, library: ctypes.CDLL, source: bytes, cache: Path) -> None:
         self.module, self._library, self.source, self._cache = model, library, source, cache
         self.signals = _signals(library, model)
         self._n, self._b = len(model.JOINTS), len(model.BASE_PARAMETERS)
-        self._large = _large()
 
     def __getattr__(self, name: str) -> Any:
         if name == "module":  # while it is being copied
             raise AttributeError(name)
         return getattr(self.module, name)
+
+    def check(self) -> None:
+        """Raise unless the signals agree with the regressor in NumPy on a tile and some samples more."""
+        (q, qd, qdd), table = _probes(self._n), self.signals
+        expected = np.asarray(self.module.regressor(q, qd, qdd)).transpose(2, 1, 0)
+        rows = self.signal_rows(q, qd, qdd, np.empty((table.count, len(q))))
+        store = np.zeros_like(expected)
+        store[table.column, table.row] = table.sign[:, None] * rows[table.signal]
+        _require_equal("signals", store, expected)
+
+    def signal_rows(self, q: Array, qd: Array, qdd: Array, out: Array, **constants: float) -> Array:
+        """The distinct signals of the regressor, shape (signals.count, N), in `out`, a float64 array in C order."""
+        states = [np.ascontiguousarray(x.T) for x in self._states("regressor", (q, qd, qdd))]
+        N = states[0].shape[1]
+        if out.shape != (self.signals.count, N) or out.dtype != np.float64 or not out.flags.c_contiguous:
+            raise InputError(f"out {out.dtype} {out.shape}; expected float64 {(self.signals.count, N)} in C order")
+        inputs = [ctypes.c_void_p(x.ctypes.data) for x in states]
+        values, length = self._constants("signals", constants), ctypes.c_int64(N)
+        others = ctypes.c_void_p(values.ctypes.data), ctypes.c_void_p(out.ctypes.data)
+        if status := getattr(self._library, f"{self.module.NAME}_signals")(length, *inputs, length, *others, length):
+            raise InputError(f"{self.module.NAME}: signals in C refused its arguments with {status}")
+        return out
+
+    def signals_alone(self, wanted: Sequence[int]) -> SignalTable:
+        """The table of signals, whose function fills the rows `wanted` alone, in the same bits; `signals` where they cannot be compiled."""
+        text = narrowed_source(self.source.decode(), wanted).encode()
+        path, functions = Path(f"{self.module.NAME}.c"), CompiledSignals.FUNCTIONS
+        try:
+            library = shared_object(
+                path, text, self._cache, lambda opened: _opened(opened, self.module, functions), CompiledSignals.OPTIONS
+            )
+        except (NotCompiledError, OSError):
+            return self.signals
+        return _signals(library, self.module)
+
+    def _states(self, name: str, given: Sequence[Array]) -> tuple[Array, ...]:
+        """Contiguous (N, n) arrays of one shape: C reads past the end of any other."""
+        states = tuple(np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in given)
+        for label, x in zip(STATES[name], states, strict=True):
+            if x.ndim != 2 or x.shape[1] != self._n or x.shape != states[0].shape:
+                raise InputError(
+                    f"{self.module.NAME}: {label} has shape {x.shape}, q {states[0].shape}; expected (N, {self._n}), the same for all"
+                )
+        return states
+
+    def _constants(self, name: str, constants: Mapping[str, float]) -> Array:
+        """Values of CONSTANTS in their order, those given in place of the robot file's."""
+        unknown = set(constants) - set(self.module.CONSTANTS)
+        if unknown:
+            raise TypeError(
+                f"{name}() got unexpected keywords {sorted(unknown)}; constants are {', '.join(self.module.CONSTANTS) or 'none'}"
+            )
+        return np.array([*{**self.module.CONSTANTS, **constants}.values()] or [0.0], dtype=float)
+
+
+class CompiledModel(CompiledSignals):
+    """The API of the generated module in C; what the C file lacks is that of the module."""
+
+    FUNCTIONS = tuple(STATES)
+    OPTIONS = FLAGS
+
+    def __init__(self, model: GeneratedModel, library: ctypes.CDLL, source: bytes, cache: Path) -> None:
+        super().__init__(model, library, source, cache)
+        self._large = _large()
 
     def regressor(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
         """D, shape (N, n, b): a view on one store of shape (b, n, N)."""
@@ -144,37 +219,10 @@ class CompiledModel:
 
     def check(self) -> None:
         """Raise unless every function agrees with NumPy on a tile and some samples more."""
-        rng = np.random.default_rng(11)
-        states = rng.uniform(-2, 2, (3, 71, self._n))
-        X = rng.uniform(-1, 1, self._b)
+        states, X = _probes(self._n), np.random.default_rng(11).uniform(-1, 1, self._b)
         for name, used in STATES.items():
             arguments = [*states[: len(used)], *([] if name == "regressor" else [X])]
-            result, expected = (getattr(m, name)(*arguments) for m in (self, self.module))
-            if not np.abs(result - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
-                raise NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
-
-    def signal_rows(self, q: Array, qd: Array, qdd: Array, out: Array, **constants: float) -> Array:
-        """The distinct signals of the regressor, shape (signals.count, N), in `out`, a float64 array in C order."""
-        states = [np.ascontiguousarray(x.T) for x in self._states("regressor", (q, qd, qdd))]
-        N = states[0].shape[1]
-        if out.shape != (self.signals.count, N) or out.dtype != np.float64 or not out.flags.c_contiguous:
-            raise InputError(f"out {out.dtype} {out.shape}; expected float64 {(self.signals.count, N)} in C order")
-        inputs = [ctypes.c_void_p(x.ctypes.data) for x in states]
-        values, length = self._constants("signals", constants), ctypes.c_int64(N)
-        others = ctypes.c_void_p(values.ctypes.data), ctypes.c_void_p(out.ctypes.data)
-        if status := getattr(self._library, f"{self.module.NAME}_signals")(length, *inputs, length, *others, length):
-            raise InputError(f"{self.module.NAME}: signals in C refused its arguments with {status}")
-        return out
-
-    def signals_alone(self, wanted: Sequence[int]) -> SignalTable:
-        """The table of signals, whose function fills the rows `wanted` alone, in the same bits; `signals` where they cannot be compiled."""
-        text = narrowed_source(self.source.decode(), wanted).encode()
-        path, flags = Path(f"{self.module.NAME}.c"), (*FLAGS, "-DSIGNALS_ONLY")
-        try:
-            library = shared_object(path, text, self._cache, lambda opened: _opened(opened, self.module, ("signals",)), flags)
-        except (NotCompiledError, OSError):
-            return self.signals
-        return _signals(library, self.module)
+            _require_equal(name, *(getattr(m, name)(*arguments) for m in (self, self.module)))
 
     def _filled_store(self, q: Array, qd: Array, qdd: Array, out: Array | None, constants: Mapping[str, float]) -> Array:
         states = self._states("regressor", (q, qd, qdd))
@@ -198,16 +246,6 @@ class CompiledModel:
         result = np.moveaxis(result, -1, 0)
         return cast(Array, result[0]) if np.ndim(given[0]) == 1 else result
 
-    def _states(self, name: str, given: Sequence[Array]) -> tuple[Array, ...]:
-        """Contiguous (N, n) arrays of one shape: C reads past the end of any other."""
-        states = tuple(np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in given)
-        for label, x in zip(STATES[name], states, strict=True):
-            if x.ndim != 2 or x.shape[1] != self._n or x.shape != states[0].shape:
-                raise InputError(
-                    f"{self.module.NAME}: {label} has shape {x.shape}, q {states[0].shape}; expected (N, {self._n}), the same for all"
-                )
-        return states
-
     def _call(self, name: str, inputs: Sequence[Array], constants: Mapping[str, float], result: Array) -> None:
         values = self._constants(name, constants)
         if not (result.flags.c_contiguous and result.flags.aligned and result.flags.writeable and result.dtype == np.float64):
@@ -218,14 +256,16 @@ class CompiledModel:
         if status:
             raise InputError(f"{self.module.NAME}: {name} in C refused its arguments with {status}")
 
-    def _constants(self, name: str, constants: Mapping[str, float]) -> Array:
-        """Values of CONSTANTS in their order, those given in place of the robot file's."""
-        unknown = set(constants) - set(self.module.CONSTANTS)
-        if unknown:
-            raise TypeError(
-                f"{name}() got unexpected keywords {sorted(unknown)}; constants are {', '.join(self.module.CONSTANTS) or 'none'}"
-            )
-        return np.array([*{**self.module.CONSTANTS, **constants}.values()] or [0.0], dtype=float)
+
+def _probes(n: int) -> Array:
+    """States q, qd, qdd of a tile and some samples more, shape (3, N, n)."""
+    return np.random.default_rng(11).uniform(-2, 2, (3, 71, n))
+
+
+def _require_equal(name: str, result: Array, expected: Array) -> None:
+    """NotCompiledError where C and NumPy differ by more than rounding."""
+    if not np.abs(result - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
+        raise NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
 
 
 @dataclass(frozen=True)
@@ -251,7 +291,7 @@ class CompiledText(ModelText):
 def text_of(model: GeneratedModel) -> ModelText:
     """The model as text, for another process: module and, of a compiled model, C file."""
     module = ModelText.of(model)
-    return CompiledText(module.name, module.text, module.digest, model.source) if isinstance(model, CompiledModel) else module
+    return CompiledText(module.name, module.text, module.digest, model.source) if isinstance(model, CompiledSignals) else module
 
 
 def _signals(library: ctypes.CDLL, model: GeneratedModel) -> SignalTable:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.model.compiled import CompiledModel
+from runtime.model.compiled import CompiledSignals
 from runtime.model.generated import GeneratedModel
 from runtime.observation.decimation import Decimation, Plan
 from runtime.observation.filters import States, decimation_plan
@@ -65,13 +65,13 @@ class DistinctSignals:
     def __init__(self, model: GeneratedModel, entries: Entries, constants: Mapping[str, float]) -> None:
         self.model, self.constants = model, constants
         self.rows = (entries.k * len(model.JOINTS) + entries.j)[entries.source]
-        self.numbers = _numbers(model, entries) if isinstance(model, CompiledModel) else np.arange(0)
+        self.numbers = _numbers(model, entries) if isinstance(model, CompiledSignals) else None  # in the C file; None: its order, or NumPy
         self._room: dict[int, tuple[Array, Array]] = {}  # by number of samples: store, signals
 
     def __call__(self, states: States) -> Array:
         """Signals of the states (B, n), shape (S, B)."""
         B = len(states)
-        if isinstance(self.model, CompiledModel):
+        if isinstance(self.model, CompiledSignals):
             return self._in_c(self.model, states)
         if B not in self._room:
             self._room[B] = self.model.store(B), np.empty((len(self.rows), B))
@@ -84,16 +84,14 @@ class DistinctSignals:
             ) from None
         return np.take(D.transpose(2, 1, 0).reshape(-1, B), self.rows, axis=0, out=signals, mode="clip")
 
-    def _in_c(self, model: CompiledModel, states: States) -> Array:
+    def _in_c(self, model: CompiledSignals, states: States) -> Array:
         """The same from a compiled model, which gives them without a store."""
         B = len(states)
         if B not in self._room:
             self._room[B] = np.empty((model.signals.count, B)), np.empty((len(self.rows), B))
         every, signals = self._room[B]
         model.signal_rows(states.q, states.qd, states.qdd, every, **self.constants)
-        return (
-            every if np.array_equal(self.numbers, np.arange(len(every))) else np.take(every, self.numbers, axis=0, out=signals, mode="clip")
-        )
+        return every if self.numbers is None else np.take(every, self.numbers, axis=0, out=signals, mode="clip")
 
 
 class DecimatedSignals:
@@ -120,7 +118,7 @@ def distinct_entries(model: GeneratedModel, constants: Mapping[str, float], colu
     states are out of reach (loops that do not close), every entry stands for itself.
     """
     columns = np.arange(len(model.BASE_PARAMETERS)) if columns is None else columns
-    if isinstance(model, CompiledModel):
+    if isinstance(model, CompiledSignals):
         return _entries_in_c(model, columns)
     row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])
     k = columns[row]
@@ -134,7 +132,7 @@ def distinct_entries(model: GeneratedModel, constants: Mapping[str, float], colu
     return Entries(row, k, j, which, sign * sign[source][which], source)
 
 
-def _entries_in_c(model: CompiledModel, columns: Array) -> Entries:
+def _entries_in_c(model: CompiledSignals, columns: Array) -> Entries:
     """The same of a compiled model, whose C file says which entries are equal."""
     table = model.signals
     order = np.argsort(columns)
@@ -146,11 +144,12 @@ def _entries_in_c(model: CompiledModel, columns: Array) -> Entries:
     )
 
 
-def _numbers(model: CompiledModel, entries: Entries) -> Array:
-    """Number of each signal in the C file."""
+def _numbers(model: CompiledSignals, entries: Entries) -> Array | None:
+    """Number of each signal in the C file; None where all of them are wanted, in its order."""
     table, n = model.signals, len(model.JOINTS)
     number = dict(zip((table.column * n + table.row).tolist(), table.signal.tolist(), strict=True))
-    return np.array([number[place] for place in (entries.k * n + entries.j)[entries.source].tolist()], dtype=np.intp)
+    numbers = [number[place] for place in (entries.k * n + entries.j)[entries.source].tolist()]
+    return None if numbers == list(range(table.count)) else np.array(numbers, dtype=np.intp)
 
 
 def _probed(model: GeneratedModel, constants: Mapping[str, float]) -> Array:

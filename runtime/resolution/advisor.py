@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import count
 from operator import add
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -35,17 +35,18 @@ from runtime.estimators.linear import assemble
 from runtime.estimators.methods import linear_system
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, drives_of, joint_units
-from runtime.model.narrowing import narrowed
 from runtime.observation.observation import stack
 from runtime.observation.position_errors import NormalEquations, Perturbation, perturbation
 from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.advice import ALL, LIMITS, Advice, EncoderAdvice, Limit, ReaderAdvice, Sampled, confirmed, crossing, sampled
-from runtime.resolution.perturbed import Task, prepared, study_columns, system_of
+from runtime.resolution.c.workspace import usable
+from runtime.resolution.perturbed import Task, prepared, study_columns
 from runtime.resolution.readers import LINES, READERS, real_encoders
 from runtime.resolution.readers import RATIO as STEPS
 from runtime.resolution.result import DECIDING, deciding_names
 from runtime.resolution.rounding import VARIANCE, rounded, stream
+from runtime.resolution.run import forget, moved_estimate
 from runtime.settings.study import Study, to_mapping
 
 Array = np.ndarray
@@ -111,6 +112,7 @@ def advise(
     Parameters
     ----------
     model : GeneratedModel
+        Emitted module, or the same in C (`runtime.model.compiled`).
     records : Record or sequence of Record
     study : Study, optional
         Default: Study().
@@ -138,7 +140,7 @@ def advise(
     SettingsError
         A method that is not linear least squares, or a median filter, which no prediction goes through.
     """
-    study = study or Study()
+    study, model = study or Study(), usable(model)
     study = replace(study, cestac=replace(study.cestac, delta=()))  # steps are what is sought
     records = (records,) if isinstance(records, Record) else tuple(records)
     _refuse(study)
@@ -152,10 +154,9 @@ def advise(
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
     decisive = [names.index(name) for name in deciding_names(reference)]
     every = range(len(model.JOINTS))
-    wanted = [(k, j) for k in map(model.BASE_PARAMETERS.index, names) for j in np.flatnonzero(np.asarray(model.STRUCTURE)[k]).tolist()]
     task = Task(
         tuple(prepared(model, record, study, drives) for record in records),
-        narrowed(model, wanted),
+        model,
         names,
         settings,
         study.cestac,
@@ -185,13 +186,16 @@ def advise(
         }
         by_reader = real_encoders(model, records, study, reference, selections, units, start, **given)
     advices = []
-    for label, own in selections.items() if law != "phase" else ():
-        unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
-        advice = _advice(predictor, label, own, names, decisive, unit)
-        if confirm:
-            advice = confirmed(advice, reference, partial(sampled_level, task, parts, reference, own))
-        advices.append(advice)
-        advance()
+    try:
+        for label, own in selections.items() if law != "phase" else ():
+            unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
+            advice = _advice(predictor, label, own, names, decisive, unit)
+            if confirm:
+                advice = confirmed(advice, reference, partial(sampled_level, task, parts, reference, own))
+            advices.append(advice)
+            advance()
+    finally:
+        forget()
     steps = np.array([predictor.change(delta, every) for delta in asked]).reshape(len(asked), len(names))
     if law == "phase":
         steps = next(reader.steps for reader in by_reader if reader.reader == study.signals.reader)
@@ -267,22 +271,20 @@ def sampled_level(
     """
     X = []
     for run in range(runs or task.settings.runs):
-        positions = [_coarse(task, part, k, delta, encoders, run) for k, part in enumerate(parts)]
-        system = linear_system(
-            system_of(cast(GeneratedModel, task.model), task, positions, [record.torque for record in task.records]), task.estimate
-        )
-        X.append(system.solve().X)
+        X.append(moved_estimate(task, [_errors(task, part, k, delta, encoders, run) for k, part in enumerate(parts)]))
     return sampled(delta, np.array(X), reference.X)
 
 
-def _coarse(task: Task, part: Perturbation, k: int, delta: float, encoders: Sequence[int], run: int) -> Array:
-    """Positions of record k, shape (N, n), with some encoders rounded."""
+def _errors(task: Task, part: Perturbation, k: int, delta: float, encoders: Sequence[int], run: int) -> Array:
+    """What rounding some encoders does to the joint positions of record k, shape (N, n)."""
     settings, q = task.settings, task.records[k].q
-    own = np.linalg.solve(part.root, q.T).T  # positions as the encoders see them, up to their offsets
-    error = np.zeros_like(own)
+    errors, seen = np.zeros(q.shape[::-1]), np.linalg.inv(part.root)  # of joints; positions as the encoders see them, up to their offsets
     for i in encoders:
-        error[:, i] = rounded(own[:, i], delta, settings.rounding, stream(settings.seed, k, run, i)) - own[:, i]
-    return np.asarray(q + error @ part.root.T)
+        own = q @ seen[i]
+        error = rounded(own, delta, settings.rounding, stream(settings.seed, k, run, i)) - own
+        for j in np.flatnonzero(part.root[:, i]):
+            errors[j] += part.root[j, i] * error
+    return errors.T
 
 
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:

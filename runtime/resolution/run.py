@@ -19,13 +19,13 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.estimators.methods import LINEAR, estimate_of, linear_system
 from runtime.estimators.normal_equations import LeastSquares, least_squares
-from runtime.model.compiled import CompiledModel
+from runtime.model.compiled import CompiledSignals
 from runtime.model.generated import GeneratedModel
 from runtime.model.narrowing import narrowed
 from runtime.observation.filters import States, decimation_plan, filtered_states
 from runtime.observation.regressor_signals import DecimatedSignals, distinct_entries
 from runtime.resolution.c.workspace import CompiledWorkspace
-from runtime.resolution.perturbed import PreparedRecord, Task, perturbed, run_position, stream_keys, torque_rows, with_deviation
+from runtime.resolution.perturbed import PreparedRecord, Task, perturbed, run_position, stream_keys, system_of, torque_rows, with_deviation
 from runtime.resolution.rounding import ADDED, noise, stream
 from runtime.resolution.runs import TRIANGULAR, Level, Run, Runs
 
@@ -46,8 +46,7 @@ def one_run(task: Task, key: tuple[int, int]) -> Run:
     draw = (run,) if task.settings.common else (number, run)
     if task.estimate.method not in LINEAR:
         return _estimated(work, key, level, draw)
-    fused = task.loop is None and all(record.selection.signals.reader == "lowpass" for record in task.records)
-    if task.estimate.method != "ols" or task.estimate.options or not fused:
+    if not _plain(task):
         system = linear_system(perturbed(work.wanted, work.task, level, draw), task.estimate)
         X = system.solve().X
         norms, method = np.array([joint.residual_norm(X) for joint in system.raw.joints]), TRIANGULAR
@@ -55,6 +54,22 @@ def one_run(task: Task, key: tuple[int, int]) -> Run:
         fit = work.fit(level, draw)
         X, norms, method = fit.X, fit.residual_norms, fit.method
     return Run(number, run, tuple(X.tolist()), float(np.linalg.norm(norms)), method)
+
+
+def moved_estimate(task: Task, errors: Sequence[Array]) -> Array:
+    """X, shape (b,), of linear least squares with the positions of every record moved by `errors`, shape (N, n) each, torques as measured."""
+    work = workspace(task)
+    if _plain(task):
+        return work.moved_fit(errors).X
+    positions = [record.q + error for record, error in zip(task.records, errors, strict=True)]
+    observation = system_of(work.wanted, work.task, positions, [record.torque for record in task.records])
+    return linear_system(observation, task.estimate).solve().X
+
+
+def _plain(task: Task) -> bool:
+    """Whether the runs are ordinary least squares on low-passed positions, which a workspace does."""
+    lowpass = all(record.selection.signals.reader == "lowpass" for record in task.records)
+    return task.estimate.method == "ols" and not task.estimate.options and task.loop is None and lowpass
 
 
 def _estimated(work: Workspace, key: tuple[int, int], level: Level, draw: tuple[int, ...]) -> Run:
@@ -84,7 +99,13 @@ class NumpyWorkspace:
 
     def fit(self, level: Level, draw: tuple[int, ...]) -> LeastSquares:
         """Ordinary least squares of Y on W_CESTAC of one draw, eq. (17)."""
-        rows = [record.rows(level, stream_keys(draw, k)) for k, record in enumerate(self.records)]
+        return self._solved([record.rows(level, stream_keys(draw, k)) for k, record in enumerate(self.records)])
+
+    def moved_fit(self, errors: Sequence[Array]) -> LeastSquares:
+        """The same with the positions of every record moved by `errors`, shape (N, n) each, torques as measured."""
+        return self._solved([record.moved_rows(error) for record, error in zip(self.records, errors, strict=True)])
+
+    def _solved(self, rows: Sequence[list[Array]]) -> LeastSquares:
         return least_squares(lambda: rows, self.columns, len(self.task.names))
 
 
@@ -106,7 +127,22 @@ class RecordWorkspace:
 
     def rows(self, level: Level, keys: tuple[tuple[int, ...], tuple[int, ...]]) -> list[Array]:
         """[W_j[:, C_j] Y_j]' of every joint, shape (|C_j| + 1, rows of joint j), with perturbed measurements."""
-        signals, torque = self._signals(level, keys[0]), torque_rows(self.work.task, self.record, level, keys[1])
+        return self._rows(self._signals(level, keys[0]), torque_rows(self.work.task, self.record, level, keys[1]))
+
+    def moved_rows(self, error: Array) -> list[Array]:
+        """The same with positions moved by `error`, shape (N, n), torques as measured. Only joints that move are filtered."""
+        rate, signals, states = self.record.rate, self.selection.signals, self.filtered
+        if signals.median == 1:
+            moving = np.flatnonzero(error.any(axis=0))
+            added = filtered_states(np.asfortranarray(error[:, moving]), rate, signals)
+            states = States(states.q.copy(order="K"), states.qd.copy(order="K"), states.qdd.copy(order="K"))
+            for of, more in ((states.q, added.q), (states.qd, added.qd), (states.qdd, added.qdd)):
+                of[:, moving] += more
+        else:
+            states = filtered_states(np.asfortranarray(self.q + error), rate, signals)
+        return self._rows(self._of(states), self.record.torque)
+
+    def _rows(self, signals: Array, torque: Array) -> list[Array]:
         return [self._joint(j, signals, torque[j]) for j in range(len(torque))]
 
     def _joint(self, j: int, signals: Array, torque: Array) -> Array:
@@ -156,7 +192,7 @@ def workspace(task: Task) -> Workspace:
     """The workspace of a task, made at its first run in this thread."""
     if getattr(_kept, "task", None) is not task:
         own, model = task.opened()
-        _kept.work = CompiledWorkspace(own, model) if isinstance(model, CompiledModel) else NumpyWorkspace(own, model)
+        _kept.work = CompiledWorkspace(own, model) if isinstance(model, CompiledSignals) else NumpyWorkspace(own, model)
         _kept.task = task
     work: Workspace = _kept.work
     return work

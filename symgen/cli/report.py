@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -41,7 +42,8 @@ def report(
         study = session.changed(session.study_of_arguments(record), "cestac", side=side)
         steps = () if encoder is None else session.changed(study, "cestac", delta=encoder).cestac.delta
         records = records_or_streams(study.record, model, study.stream)
-        result = assess(model, records, study, encoder=steps, variants=session.variants_of(robot), progress=session.say)
+        runs = partial(session.model_of_runs, model, robot)
+        result = assess(model, records, study, encoder=steps, variants=session.variants_of(robot), runs=runs, progress=session.say)
         runtime.report(result, results)
         checklist = result.checklist
         typer.echo(json_text(checklist.summary()) if json else checklist.to_text(), nl=not json)

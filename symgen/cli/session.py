@@ -126,18 +126,23 @@ def _in_c(model: GeneratedModel, robot: str | None) -> GeneratedModel:
 
     source = None
     if robot is not None:
-        from symgen.description import load_robot
-        from symgen.emit.generate import generate_files
-        from symgen.emit.importing import stored_path
+        from symgen.emit.certified import c_file
 
-        ((name, text),) = generate_files(load_robot(robot), targets=("c",)).items() or [(f"{model.NAME}.c", "")]
-        source = stored_path(name, text)
+        source = c_file(robot)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         compiled = usable(compiled_model(model, source=source))
     for warning in caught:
         typer.echo(str(warning.message), err=True)
     return compiled
+
+
+def model_of_runs(model: GeneratedModel, robot: str) -> GeneratedModel:
+    """The model for the runs of a resolution study: with its signals in C where there is a compiler."""
+    from runtime.resolution.c import workspace
+    from symgen.emit.certified import c_file
+
+    return workspace.model_of_runs(model, Path(robot).with_suffix(".c") if Path(robot).suffix == ".py" else c_file(robot))
 
 
 def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Study:

@@ -32,12 +32,14 @@ from runtime.records.reading import read_records
 from runtime.reporting.files import Files, identification_files, resolution_files
 from runtime.reporting.page import Section
 from runtime.reporting.resolution import resolution_section
+from runtime.resolution.c.workspace import model_of_runs
 from runtime.resolution.result import LevelResult
 from runtime.settings.location import located
 from runtime.settings.study import CestacSettings, EstimateSettings, Lowpass, Signals, ValidateSettings, study_from_mapping
 from runtime.table import Table
 from symgen.demo import tx40_tables as chapter
 from symgen.demo.simulated_record import Prepared, motor_record, read_simulated
+from symgen.emit.certified import c_file
 
 DATASET = "tx40"
 SEED = 1
@@ -143,13 +145,14 @@ def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], No
     result = runtime.identify(model, record, study)
     names = result.essential.names
     progress("physical consistency, encoder")
-    advice = runtime.advise(model, record, study, columns=names, asked=(recorded_step(record),))
+    runs = model_of_runs(model, c_file(DATASET))
+    advice = runtime.advise(runs, record, study, columns=names, asked=(recorded_step(record),))
     result = replace(result, feasibility=feasibility_of(result), advice=advice)
 
     def resolution(changed: Study, **settings: Any) -> Cestac:
         changed = replace(changed, cestac=replace(changed.cestac, **settings))
         columns = None if changed.cestac.columns != "essential" else names
-        return runtime.cestac(model, record, changed, columns=columns)
+        return runtime.cestac(runs, record, changed, columns=columns)
 
     progress("encoder resolution")
     main = resolution(study)

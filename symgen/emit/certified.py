@@ -126,6 +126,12 @@ def model(robot: str | Path | Robot, *, target: str = "numpy") -> ModuleType:
     return module
 
 
+def c_file(robot: str | Path | Robot) -> Path:
+    """The C file of a robot, in the cache by content; an empty one of a robot whose loops are closed by iteration, which has none."""
+    robot = robot if isinstance(robot, Robot) else load_robot(robot)
+    return stored_path(f"{robot.name}.c", generate_files(robot, targets=("c",)).get(f"{robot.name}.c", ""))
+
+
 def module_errors(module: ModuleType, regrouping: Regrouping) -> dict[str, float]:
     """Largest difference of each function of an emitted module from the dynamics by energies, of the largest entry.
 

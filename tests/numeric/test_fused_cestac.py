@@ -12,8 +12,9 @@ from scipy.signal import decimate
 
 from oracles.random_robots import random_robot
 from runtime.errors import InputError, ModelError
+from runtime.estimators.methods import linear_system
 from runtime.model.compile_cache import FallbackWarning, cache_folder
-from runtime.model.compiled import CompiledModel, text_of
+from runtime.model.compiled import CompiledModel, CompiledSignals, text_of
 from runtime.model.drives import Drives
 from runtime.model.generated import ModelText
 from runtime.observation.filters import filtered_states
@@ -21,8 +22,10 @@ from runtime.observation.observation import decimated_torque, select_rows
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
+from runtime.resolution.c.workspace import model_of_runs
 from runtime.resolution.cestac import cestac
-from runtime.resolution.perturbed import perturbed_position
+from runtime.resolution.perturbed import Task, perturbed_position, prepared, system_of
+from runtime.resolution.run import forget, moved_estimate
 from runtime.resolution.runs import NORMAL, TRIANGULAR
 from runtime.settings.study import CestacSettings, Decimate, EstimateSettings, Lowpass, Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
@@ -113,6 +116,27 @@ def test_runs_on_random_robots_are_those_of_numpy(seed, changed, tmp_path):
         assert np.abs(X - reference).max() <= 1e-10 * np.abs(reference).max()
         np.testing.assert_allclose(level.runs.residual_norm, expected.runs.residual_norm, rtol=1e-10)
         assert np.array_equal(level.runs.normal, expected.runs.normal)
+
+
+@pytest.mark.parametrize(("method", "median"), [("ols", 1), ("ols", 3), ("wls", 1)])
+def test_positions_moved_by_given_errors(planar, tmp_path, method, median):
+    """One encoder moved: the whole pipeline on moved positions, in NumPy, in C, and with the signals alone in C."""
+    (tmp_path / "planar_2r.c").write_bytes(planar.source)
+    settings = replace(study(median=median), estimate=EstimateSettings(method))
+    record = record_of(planar, 1500, 4)
+    errors = np.zeros_like(record.q)
+    errors[:, 1] = np.random.default_rng(5).normal(0, 1e-3, 1500)
+    signals = model_of_runs(planar.module, tmp_path / "planar_2r.c")
+    assert type(signals) is CompiledSignals and signals.regressor == planar.module.regressor
+    found = []
+    for model in (planar.module, planar, signals):
+        own = prepared(model, record, settings)
+        task = Task((own,), model, planar.BASE_PARAMETERS, settings.estimate, settings.cestac, (), None, {})
+        found.append(moved_estimate(task, [errors]))
+        system = system_of(planar.module, task, [record.q + errors], [own.torque])
+        np.testing.assert_allclose(found[-1], linear_system(system, settings.estimate).solve().X, rtol=1e-9)
+        assert abs(found[-1] / moved_estimate(task, [0 * errors]) - 1).max() > 1e-5
+    forget()
 
 
 def test_columns_in_an_order_of_their_own_and_weights(planar):

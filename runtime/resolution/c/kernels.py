@@ -23,7 +23,7 @@ from scipy.signal import sosfilt_zi
 
 from runtime.errors import InputError
 from runtime.model.compile_cache import FLAGS, NotCompiledError, cache_folder, shared_object
-from runtime.model.compiled import CompiledModel
+from runtime.model.compiled import CompiledSignals
 from runtime.model.generated import GeneratedModel, constants_of
 from runtime.observation.decimation import Plan
 from runtime.observation.filters import butterworth, decimation_plan, median_filtered, require_longer
@@ -207,7 +207,7 @@ class SignalEntries:
         Function that gives the wanted signals.
     """
 
-    def __init__(self, model: CompiledModel, names: Sequence[str]) -> None:
+    def __init__(self, model: CompiledSignals, names: Sequence[str]) -> None:
         unknown = [name for name in names if name not in model.BASE_PARAMETERS]
         if unknown:
             raise InputError(f"no column {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}")
@@ -225,7 +225,7 @@ class SignalEntries:
         self.table = table if len(self.wanted) == table.count else model.signals_alone(self.wanted.tolist())
 
 
-def constant_values(model: CompiledModel, constants: Mapping[str, float]) -> Array:
+def constant_values(model: CompiledSignals, constants: Mapping[str, float]) -> Array:
     """Geometry and gravity in the order of CONSTANTS, some of them in place of the robot file's."""
     return np.array([*constants_of(cast(GeneratedModel, model), constants).values()] or [0.0], dtype=float)
 

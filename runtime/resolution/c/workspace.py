@@ -7,6 +7,8 @@ perturbed positions go in and small matrices come out; room is reused from run t
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
+from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -14,7 +16,7 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.estimators.normal_equations import LeastSquares
 from runtime.model.compile_cache import FallbackWarning
-from runtime.model.compiled import CompiledModel
+from runtime.model.compiled import CompiledSignals, compiled_signals
 from runtime.model.generated import GeneratedModel
 from runtime.resolution.c import kernels
 from runtime.resolution.c.least_squares import KeptRows, least_squares
@@ -28,16 +30,26 @@ Array = np.ndarray
 
 def usable(model: GeneratedModel) -> GeneratedModel:
     """`model`, or the NumPy module of a compiled one, with a FallbackWarning saying why, where the kernels of studies cannot be had."""
-    if isinstance(model, CompiledModel) and (reason := unavailable()):
+    if isinstance(model, CompiledSignals) and (reason := unavailable()):
         warnings.warn(f"{model.NAME}: NumPy in place of C: {reason}", FallbackWarning, stacklevel=3)
         return model.module
     return model
 
 
+def model_of_runs(model: GeneratedModel, source: Path) -> GeneratedModel:
+    """`model` with its signals in C, for the runs of resolution studies; without a word `model` itself where that cannot be had.
+
+    source : the C file of the robot.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FallbackWarning)
+        return usable(compiled_signals(model, source=source))
+
+
 class CompiledWorkspace:
     """What one thread keeps from run to run of one task."""
 
-    def __init__(self, task: Task, model: CompiledModel) -> None:
+    def __init__(self, task: Task, model: CompiledSignals) -> None:
         self.task, self.compiled, self.entries = task, model, kernels.SignalEntries(model, task.names)
         self.constants = kernels.constant_values(model, task.constants)
         self.room = kernels.Room()
@@ -59,19 +71,29 @@ class CompiledWorkspace:
         rows = []
         for k, (record, q, room) in enumerate(self.records):
             position, torque = stream_keys(draw, k)
-            y = self._signals(record, q, level, position, room)
+            y = self._signals(record, self._states(record, q, level, position, room), room)
             rows.append((y, torque_rows(self.task, record, level, torque), record.selection.mask))
         return least_squares(KeptRows(self.entries, rows, self.room))
 
-    def _signals(self, record: PreparedRecord, q: Array, level: Level, key: tuple[int, ...], room: kernels.Room) -> Array:
-        """Distinct signals of the wanted columns at the kept samples, shape (S, K)."""
+    def moved_fit(self, errors: Sequence[Array]) -> LeastSquares:
+        """The same with the positions of every record moved by `errors`, shape (N, n) each, torques as measured."""
+        rows = []
+        for (record, q, room), error in zip(self.records, errors, strict=True):
+            states = kernels.FilteredStates(q + error, record.rate, record.selection.signals, room)
+            rows.append((self._signals(record, states, room), record.torque, record.selection.mask))
+        return least_squares(KeptRows(self.entries, rows, self.room))
+
+    def _states(self, record: PreparedRecord, q: Array, level: Level, key: tuple[int, ...], room: kernels.Room) -> kernels.FilteredStates:
+        """States of one draw."""
         settings, selection = self.task.settings, record.selection
         if self.two_point and level.delta and selection.signals.median == 1:  # the sum is left to C
             up = bits(q.shape, stream(settings.seed, *key))
-            states = kernels.FilteredStates(q, record.rate, selection.signals, room, up=up, step=level.delta)
-        else:
-            moved = run_position(self.task, record, level, key)
-            states = kernels.FilteredStates(moved, record.rate, selection.signals, room)
+            return kernels.FilteredStates(q, record.rate, selection.signals, room, up=up, step=level.delta)
+        return kernels.FilteredStates(run_position(self.task, record, level, key), record.rate, selection.signals, room)
+
+    def _signals(self, record: PreparedRecord, states: kernels.FilteredStates, room: kernels.Room) -> Array:
+        """Distinct signals of the wanted columns at the kept samples, shape (S, K)."""
+        selection = record.selection
         y = kernels.decimated(self.entries, states, selection.samples, selection.factor, selection.signals.decimate, self.constants, room)
         if not np.isfinite(y).all():
             raise InputError(f"the regressor of {self.compiled.NAME} is not finite at perturbed positions; use smaller steps")
