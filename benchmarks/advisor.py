@@ -42,19 +42,20 @@ from runtime.resolution.perturbed import Task, prepared  # noqa: E402
 from runtime.resolution.readers import RealEncoders  # noqa: E402
 from runtime.settings.study import study_from_mapping  # noqa: E402
 from symgen.demo.counts import MAIN  # noqa: E402
-from symgen.demo.haptic_motion import haptic_record, haptic_study  # noqa: E402
+from symgen.demo.haptic_motion import DURATION, haptic_record, haptic_study  # noqa: E402
 
 RUNS = {"emps": 100, "tx40": 60, "haptic": 30}
 LEVELS = 8
 ROUNDS = 5
 RATIO = 1.3
-REAL_RUNS = 12
+REAL_RUNS = {"emps": 100, "tx40": 24, "haptic": 24}
+HAPTIC_SHARE = 4  # of the motion of the haptic device, where real encoders are judged
 
 
-def opened(name, model, folder):
+def opened(name, model, folder, share=1):
     """Study, without median filter ahead of the rounding, and record."""
     if name == "haptic":
-        content, settings = haptic_record(model)
+        content, settings = haptic_record(model, DURATION / share)
         (folder / settings.files[0]).write_bytes(content)
         study = replace(haptic_study(5), record=(settings,))
     else:
@@ -136,11 +137,11 @@ def needed_runs(whole, model, record, names, level):
 
 
 def real_table(name, model, study, record, names):
-    """Steps predicted by the quadrature over the phase, and steps at which REAL_RUNS runs of random phase cross the limits, by reader and parameter."""
+    """Steps predicted by the quadrature over the phase, and steps at which runs of random phase cross the limits, by reader and parameter."""
     law = replace(study, cestac=replace(study.cestac, rounding="phase", delta=()))
     start = time.process_time()
     advice = advise(model, record, law, columns=names, encoders=("all",), confirm=False)
-    print(f"\n{name}: predicted in {time.process_time() - start:.0f} s of CPU; sampled by {REAL_RUNS} runs", flush=True)
+    print(f"\n{name}: predicted in {time.process_time() - start:.0f} s of CPU; sampled by {REAL_RUNS[name]} runs", flush=True)
     for reader in advice.real:
         own = law if reader.reader == "lowpass" else replace(law, signals=replace(law.signals, reader="counts"))
         real = RealEncoders(model, [record], own, names, drives_of(model), {}, reader.reader)
@@ -153,15 +154,21 @@ def real_table(name, model, study, record, names):
                 continue
             near = first.delta[np.abs(np.log(first.delta / limit.delta)) < 2 * np.log(RATIO)]
             grid = near if len(near) > 5 else limit.delta * RATIO ** np.arange(-2, 3.0)  # where steps lock, those of the curve
-            e = np.abs([real.sampled(range(record.n), delta, REAL_RUNS).change for delta in grid])
+            points = [real.sampled(range(record.n), delta, REAL_RUNS[name]) for delta in grid]
+            e, half = np.abs([p.change for p in points]), np.array([p.half_width for p in points])
             steps = {n: crossing(grid, e[:, names.index(n)], limit.percent) for n in advice.deciding}
             reached = first.reached(limit.percent)
             ratios += [reached[names.index(n)] / s for n, s in steps.items() if np.isfinite([reached[names.index(n)], s]).all()]
             sampled = min((s for s in steps.values() if np.isfinite(s)), default=np.nan)
             which = min(steps, key=lambda n: steps[n] if np.isfinite(steps[n]) else np.inf)
+            i, nearest = names.index(limit.parameter), int(np.argmin(np.abs(np.log(grid / limit.delta))))
+            least, most = (
+                crossing(grid, e[:, i] + half[:, i], limit.percent),
+                crossing(grid, np.clip(e[:, i] - half[:, i], 0, None), limit.percent),
+            )
             print(f"  {reader.reader:8} {limit.percent:g} %: predicted {limit.delta:.3e} ({limit.parameter}), sampled {sampled:.3e} ({which}), "
-                  f"ratio {limit.delta / sampled:.2f}; {limit.parameter} sampled at the step nearest to the predicted one: "
-                  f"{e[np.argmin(np.abs(np.log(grid / limit.delta))), names.index(limit.parameter)]:.2f} %", flush=True)  # fmt: skip
+                  f"ratio {limit.delta / sampled:.2f}; {limit.parameter}: predicted over sampled {limit.delta / steps[limit.parameter]:.2f} "
+                  f"[{limit.delta / most:.2f}, {limit.delta / least:.2f}], runs near the predicted step {e[nearest, i]:.2f} +- {half[nearest, i]:.2f} %", flush=True)  # fmt: skip
         print(*reader.notes, sep="\n")
         print(
             f"  {reader.reader:8} by parameter: {sum(abs(r - 1) <= 0.2 for r in ratios)} of {len(ratios)} predicted steps within 20 % of the sampled ones"
@@ -174,7 +181,7 @@ def main():
     for name in [n for n in sys.argv[1:] if n != "--real"] or RUNS:
         with TemporaryDirectory() as folder:
             model = symgen.model(name)
-            study, record = opened(name, model, Path(folder))
+            study, record = opened(name, model, Path(folder), HAPTIC_SHARE if real else 1)
             found = essential_of(observe(model, record, study), study.essential, study.estimate)
             if real:
                 real_table(name, model, study, record, MAIN if name == "tx40" else found.names)

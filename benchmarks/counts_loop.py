@@ -36,10 +36,14 @@ from runtime.settings.study import EstimateSettings, Lowpass, Study
 from runtime.table import aligned
 
 Array = np.ndarray
-STEPS = {"tx40": [2 * np.pi / k for k in (4000, 2000, 1000, 500)], "emps": [2e-5, 5e-5, 1e-4]}
+STEPS = {
+    "tx40": [2 * np.pi / k for k in (4000, 2000, 1000, 500)],
+    "emps": [2e-5, 5e-5, 1e-4],
+    "haptic": [2 * np.pi / k for k in (200, 100, 50, 25)],
+}
 LOW, COUNTS = ("ols", "wls", "iv", "didim"), ("counts ols", "counts wls", "counts iv", "counts didim")
 STARTED = "didim from counts"
-BAND = {"tx40": 50.0, "emps": 100.0}  # Hz
+BAND = {"tx40": 50.0, "emps": 100.0, "haptic": 10.0}  # Hz
 
 
 def estimates(robot: str, step: float, seed: int, simulating: bool) -> list[dict[str, Any]]:
@@ -47,7 +51,8 @@ def estimates(robot: str, step: float, seed: int, simulating: bool) -> list[dict
     b = bench(robot)
     run = with_encoder(robot, step).run(b.truth, b.reference, seed=seed)
     record = replace(run.record(), q_r=b.reference.q)
-    study = replace(b.study, signals=replace(b.study.signals, reader="counts", step=step))
+    signals = replace(b.study.signals, reader="counts", step=step, side=b.study.controller.encoder.side)
+    study = replace(b.study, signals=signals)
     observations = {reader: observed(robot, record, own) for reader, own in (("", b.study), ("counts", study))}
     key = {"robot": robot, "step": step, "seed": seed}
     rows, start = [], {}
@@ -89,10 +94,12 @@ def observed(robot: str, record: Record, study: Study) -> Observation:
 def calibration(robot: str, run: Any, step: float) -> list[float]:
     """rms of the errors of q, qd, qdd over their stated deviations, then of the errors below BAND, where the arm is faster than the rows of the study need."""
     study = bench(robot).study
-    reading = read_counts(run.record().q, run.rate, step)
+    law = with_encoder(robot, step).law
+    reading = read_counts((run.record().q - law.offset) @ law.R.T, run.rate, step)
     N = len(reading.q)
     moving = np.abs(run.qd[:N]) > float(np.max(study.rows.low_speed))
-    errors = [reading.q - run.q[:N], reading.qd - run.qd[:N], reading.qdd - run.qdd[:N]]
+    true = ((run.q[:N] - law.offset) @ law.R.T, run.qd[:N] @ law.R.T, run.qdd[:N] @ law.R.T)
+    errors = [read - of for read, of in zip((reading.q, reading.qd, reading.qdd), true, strict=True)]
     errors[0] = errors[0] - np.median(errors[0], axis=0)  # floor against round cannot be told
     low = Lowpass(cutoff=BAND[robot])
     slow = [lowpass_filtered(e, run.rate, low) for e in errors]

@@ -30,6 +30,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from simulation import LAW
 
+import symgen
 from runtime import InputError, load_model
 from runtime.estimators.closed_loop import ClosedLoop, closed_loop
 from runtime.estimators.estimate import Estimate
@@ -45,6 +46,7 @@ from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.settings.study import EstimateSettings, Study, study_from_mapping
 from runtime.table import aligned
+from symgen.demo.haptic_motion import RATE, motion
 
 Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
@@ -61,8 +63,18 @@ TX40 = {
         "torque": {"noise": 0.05, "disturbance": [0.5, 0.5, 0.3, 0.1, 0.1, 0.05], "bandwidth": 50},
     },
 }
+HAPTIC = {  # the motion of the demo; two poles of each joint at 25/s
+    "signals": {"median": 1, "lowpass": {"cutoff": 10}},
+    "rows": {"trim": 3, "low_speed": 0.05},
+    "controller": {
+        "law": {"kind": "pid", "kp": [30, 18, 9], "kd": [1.8, 1.0, 0.5]},
+        "rate": RATE,
+        "encoder": {"side": "motor"},
+        "torque": {"noise": [0.05, 0.05, 0.03], "disturbance": [0.01, 0.01, 0.005], "bandwidth": 20},
+    },
+}
 STEPS = {"tx40": [2 * np.pi / k for k in (8000, 4000, 2000, 1000)], "emps": [1e-6, 2e-5, 5e-5, 1e-4]}
-AROUND = {"tx40": 0.1, "emps": 0.02}  # s
+AROUND = {"tx40": 0.1, "emps": 0.02, "haptic": 0.2}  # s
 DETERMINED = 2.0  # %sigma, corrected, of weighted least squares on a record with an exact encoder
 AWAY = 0.15
 UNIT = {"tx40": "rad", "emps": "m"}
@@ -88,10 +100,12 @@ class Bench(NamedTuple):
 @cache
 def bench(robot: str) -> Bench:
     """Model, settings, simulator, reference and truth of one robot."""
-    model = load_model(robot, folder=GENERATED)
+    model = symgen.model(robot) if robot == "haptic" else load_model(robot, folder=GENERATED)
     if robot == "tx40":
         study = study_from_mapping(TX40)
         reference = reference_of(study.controller, model)
+    elif robot == "haptic":
+        study, reference = study_from_mapping(HAPTIC), motion()
     else:
         study = study_from_mapping(dataset_study(robot))
         reference = reference_of(study.controller, model, records=read_records(study.record, model))

@@ -69,15 +69,14 @@ def _panel(ax: Axes, reader: str, encoder: EncoderAdvice, line: str, points: str
 
 def advice_section(advice: Advice) -> Section:
     """Steps by encoder and by parameter, the figure, the assumptions."""
-    image = drawn(
-        "%e against resolution: predicted curve and sampled points of every parameter that matters; dotted: 1 % and 5 %; grey: the steps advised",
-        advice_figure(advice),
-        "Change of every parameter in per cent against encoder resolution, predicted and sampled, logarithmic axes",
-        "advice",
-    )
-    return Section(
-        "Resolution advice",
-        (advice.verdict, *advice.asked_lines(), *advice.assumptions),
-        [image] if advice.deciding else [],
-        advice.tables(),
-    )
+    images = []
+    if advice.deciding:
+        images.append(
+            drawn(
+                "%e against resolution: predicted curve and sampled points of every parameter that matters; dotted: 1 % and 5 %; grey: the steps advised",
+                advice_figure(advice),
+                "Change of every parameter in per cent against encoder resolution, predicted and sampled, logarithmic axes",
+                "advice",
+            )
+        )
+    return Section("Resolution advice", (advice.verdict, *advice.asked_lines(), *advice.assumptions), images, advice.tables())

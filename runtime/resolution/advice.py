@@ -189,7 +189,7 @@ class Advice:
         decisive = [self.names.index(name) for name in self.deciding]
         e = np.abs((self.steps if steps is None else steps)[step])[decisive]
         k = int(np.argmax(e)) if len(e) else 0
-        return (self.names[decisive[k]], float(e[k])) if len(e) else ("", 0.0)
+        return (self.names[decisive[k]], float(e[k])) if len(e) else ("", float("nan"))
 
     @property
     def negative(self) -> bool:
@@ -210,6 +210,10 @@ class Advice:
 
     def _answers(self, encoders: Sequence[EncoderAdvice]) -> list[str]:
         """Sentences on some encoders, all together first."""
+        if not self.deciding:
+            return [
+                f"no parameter has a %sigma of at most {DECIDING:g} %, so no step can be judged; more motion, or fewer columns, tell more."
+            ]
         first, single = encoders[0], encoders[1:]
         parts = [self._sentence(limit, "With every encoder alike", first.unit) for limit in first.limits]
         for unit in dict.fromkeys(advice.unit for advice in single) if len(single) > 1 else ():

@@ -10,14 +10,14 @@ not in the change; `runtime.resolution.cestac`, which compares with all rows of 
 White noise does not describe a sawtooth that is locked to the motion, still less what a reader of counts leaves of it, so no first-order law is used:
 the mean over the random phase is a quadrature. Its nodes are equidistant, shuffled from encoder to encoder, so that the harmonics of the sawtooth cancel
 that are linear in the estimate; what is left is the bias. One reading of all encoders serves every choice S. Limits are where the curve crosses 1 % and
-5 %; runs of random phase confirm them.
+5 %; at the steps on either side the mean is taken over as many nodes as tell it to SHARP of the limit. Runs of random phase confirm the limits.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Literal
 
 import numpy as np
@@ -56,6 +56,7 @@ Reader = Literal["lowpass", "counts"]
 
 READERS: tuple[Reader, ...] = ("lowpass", "counts")
 PHASES: Mapping[Reader, int] = {"lowpass": 8, "counts": 4}  # nodes of the quadrature over the phase
+SHARP, MOST_PHASES = 0.1, 32  # deviation of the change near a limit, over the limit, and the most nodes for it
 RATIO = 1.5  # of neighbouring steps
 FINER_STEPS, LOCKED = 10, 1.5  # steps put between two neighbours, where the sawtooth passes the filters by so much more than at both
 UNCERTAIN = 2.0  # ratio of the steps between which a change cannot be told from a limit, from which the advice says so
@@ -150,9 +151,9 @@ class RealEncoders:
                 most[k] = max(most[k], float((weight @ passed).max()) / band)
         return most
 
-    def nodes(self, delta: float, moving: Sequence[int]) -> list[list[Errors]]:
-        """Errors of every record at the nodes of the quadrature, the encoders `moving` coarse."""
-        count = PHASES[self.reader]
+    def nodes(self, delta: float, moving: Sequence[int], count: int | None = None) -> list[list[Errors]]:
+        """Errors of every record at the nodes of the quadrature, the encoders `moving` coarse. count : of nodes; default: PHASES."""
+        count = count or PHASES[self.reader]
         shuffled = [stream(self.study.cestac.seed, QUADRATURE + i).permutation(count) for i in range(len(self.model.JOINTS))]
         shift = stream(self.study.cestac.seed, QUADRATURE).random(len(shuffled))
         at = [np.array([(order[k] + u) / count for order, u in zip(shuffled, shift, strict=True)]) for k in range(count)]
@@ -282,7 +283,8 @@ def curves(
         except np.linalg.LinAlgError:  # steps that this reader does not resolve
             return {}
         for label, own in asked.items():
-            known[label][k] = real.change(nodes, own)
+            if k not in known[label]:
+                known[label][k] = real.change(nodes, own)
         return {label: float(np.abs(known[label][k][0, decisive]).max(initial=0.0)) for label in asked}
 
     for step, most, limit in ((-1, DOWN, LIMITS[0]), (1, UP, LIMITS[-1])):
@@ -297,12 +299,36 @@ def curves(
         if share[1:-1].max() > LOCKED * max(share[0], share[-1]):
             for k in between[1:-1].tolist():
                 evaluate(k)
+    sharp: dict[str, set[float]] = {label: set() for label in selections}
+    for label, limit in product(selections, LIMITS):
+        moving = [i for i in selections[label] if np.isfinite(coarsest[i])]
+        while vague := {at: n for at, n in beside(real.reader, known[label], decisive, limit).items() if at not in sharp[label]}:
+            for at, count in vague.items():
+                known[label][at] = real.change(real.nodes(start * RATIO**at, moving, count), moving)
+            sharp[label].update(vague)
+            last = max(known[label])
+            if last in vague and np.abs(known[label][last][0, decisive]).max() < LIMITS[-1]:
+                evaluate(last + 1)
     order = {label: sorted(own) for label, own in known.items()}
     b = len(real.names)
     return {
         label: (start * RATIO ** np.array(ks, dtype=float), np.array([known[label][k] for k in ks]).reshape(len(ks), 2, b))
         for label, ks in order.items()
     }
+
+
+def beside(reader: Reader, known: Mapping[float, Array], decisive: Sequence[int], limit: float) -> dict[float, int]:
+    """Of the two steps between which the first parameter crosses a limit, those whose nodes do not tell its change to SHARP of it, and how many would.
+
+    known : change and its deviation, shape (2, b), %, by step.
+    """
+    steps = sorted(known)
+    over = [j for j, k in enumerate(steps) if np.abs(known[k][0, decisive]).max(initial=0.0) >= limit]
+    if not over:
+        return {}
+    first = decisive[int(np.argmax(np.abs(known[steps[over[0]]][0, decisive])))]
+    share = {k: known[k][1, first] / (SHARP * limit) for k in steps[max(over[0] - 1, 0) : over[0] + 1]}
+    return {k: min(int(np.ceil(PHASES[reader] * x**2)), MOST_PHASES) for k, x in share.items() if x > 1}
 
 
 def _advice(label: str, delta: Array, change: Array, reference: Estimate, unit: str) -> EncoderAdvice:

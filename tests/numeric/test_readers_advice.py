@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from campaign import campaign
 from test_cestac_counts import RECORD, SIGNALS, STEP, planar
 
 from runtime.observation.filters import filtered_states
 from runtime.reporting.resolution_advice import advice_section
+from runtime.resolution.advice import crossing
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
 from runtime.resolution.readers import RATIO, RealEncoders, curves
@@ -22,9 +22,7 @@ STUDY = Study(
 )
 
 
-@pytest.fixture(scope="module")
-def advice():
-    return advise(planar, RECORD, STUDY, encoders=("all", "2"), asked=(STEP, 10.0))
+PART = replace(RECORD, t=RECORD.t[:2500], q=RECORD.q[:2500], tau=RECORD.tau[:2500])
 
 
 def test_quadrature_over_the_phase_is_the_mean_of_cestac():
@@ -43,7 +41,8 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
 
 
 @campaign
-def test_steps_by_both_readers(advice):
+def test_steps_by_both_readers():
+    advice = advise(planar, RECORD, STUDY, encoders=("all", "2"))
     positions, counts = advice.real
     assert (positions.reader, counts.reader) == ("lowpass", "counts") and advice.encoders is positions.encoders
     assert [encoder.label for encoder in counts.encoders] == ["all", "2"]
@@ -54,7 +53,14 @@ def test_steps_by_both_readers(advice):
     assert advice.real[0].encoders[0].limits[0].delta <= min(encoder.limits[0].delta for encoder in positions.encoders[1:]) * 1.05
 
 
-def test_side_by_side_in_words(advice):
+def test_side_by_side_in_words():
+    advice = advise(
+        planar,
+        PART,
+        replace(STUDY, rows=Rows(trim=5), cestac=replace(STUDY.cestac, columns=("ZZ1R",))),
+        encoders=("all", "2"),
+        asked=(STEP, 10.0),
+    )
     text = str(advice)
     assert "positions, 1 %" in text and "counts, 5 %" in text and "quadrature over the phase" in text
     assert "Real encoders read as counts: With every encoder alike" in advice.verdict
@@ -67,6 +73,13 @@ def test_side_by_side_in_words(advice):
         f"read as positions: largest predicted change {e:.2f} % ({name})" in text
         and "10, read as counts: not judged on this record" in text
     )
+
+
+def test_no_step_is_advised_where_no_parameter_is_determined():
+    advice = advise(planar, PART, replace(STUDY, rows=Rows(trim=5)), encoders=("all",), asked=(STEP,))
+    assert not advice.deciding and not advice.negative
+    assert "read as counts: no parameter has a %sigma of at most 10 %" in advice.verdict and "no step makes" not in advice.verdict
+    assert "not judged on this record" in str(advice) and not advice_section(advice).images
 
 
 def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
@@ -86,10 +99,30 @@ def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
     assert near.sum() >= 3 and ratio[near].max() < 1.05
 
 
+class Scattered:
+    """A change of e = step % whose mean over few phases is one deviation too large, 1.6 % of one phase; encoder 2 rests."""
+
+    reader, names, finest, coarsest = "counts", ("FV1",), 0.1, np.array([1e3, np.inf])
+
+    def nodes(self, delta, moving, count=4):
+        assert moving == [0]
+        return delta, count
+
+    def change(self, nodes, encoders):
+        delta, count = nodes
+        return np.array([[-delta - 1.6 / np.sqrt(count)], [1.6 / np.sqrt(count)]])
+
+
+def test_more_phases_at_the_steps_beside_a_limit():
+    delta, change = curves(Scattered(), {"all": (0, 1)}, 1.0, [0])["all"]
+    e, deviation = np.abs(change[:, 0, 0]), dict(zip(delta, change[:, 1, 0], strict=True))
+    assert deviation[1.5] == deviation[2.25] == 0.8 and max(deviation[delta[delta < 1].max()], deviation[1.0]) < 0.3
+    assert 0.6 < crossing(delta, e, 1.0) < 1 and 4.4 < crossing(delta, e, 5.0) < 5  # 0.2 and 4.2 by the few
+
+
 def test_a_record_that_is_coarse_itself_sets_the_finest_step():
     d = 1e-3
-    part = replace(RECORD, t=RECORD.t[:2500], q=RECORD.q[:2500], tau=RECORD.tau[:2500])
-    coarse = replace(part, q=d * np.round(part.q / d))
+    coarse = replace(PART, q=d * np.round(PART.q / d))
     found = advise(planar, coarse, replace(STUDY, rows=Rows(trim=5)), encoders=("2",), confirm=False)
     steps = [delta for reader in found.real for delta in reader.encoders[0].delta]
     assert steps and min(steps) >= 5 * d * (1 - 1e-9)
