@@ -1,6 +1,6 @@
 """The reader of counts on simulated records of known truth: which rows of uncertain direction to leave out, and whether stated deviations hold.
 
-    python benchmarks/counts_simulated.py [rows sigma] [--records 100]
+    python benchmarks/counts_simulated.py [rows sigma gaps] [--records 100]
 
 Motions of the TX40 with an exact encoder, quantised afterwards at a random phase of every joint and record:
 
@@ -10,7 +10,7 @@ Motions of the TX40 with an exact encoder, quantised afterwards at a random phas
 
 Torques are those of the values of the robot file with white noise of 0.05 N m and noise up to 5 Hz of 3 % of the torque (`sigma`: 1 %); its dry
 friction is one of FRICTION. Parts: `rows`, errors against the estimate from the exact positions of the same record, by the deviations below which a row is left
-out; `sigma`, errors against the truth over stated sigma. Estimates are kept in counts_simulated_runs.jsonl; the same command goes on from there.
+out; `sigma`, errors against the truth over stated sigma; `gaps`, errors of the filtered acceleration where samples are missing. Estimates are kept in counts_simulated_runs.jsonl; the same command goes on from there.
 """
 
 # ruff: noqa: E402
@@ -20,6 +20,7 @@ import argparse
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,6 +31,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np
 from counts import MAIN, STEPS, quantised
 from estimators import TX40, bench
+from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 from simulation import LAW
 
@@ -37,6 +39,7 @@ from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import estimate_of
 from runtime.motion.reference import Reference, reference_of
 from runtime.motion.simulation import Simulator
+from runtime.observation.counts import read_counts
 from runtime.observation.filters import States, filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states
 from runtime.observation.rows import select_rows
@@ -239,6 +242,32 @@ def sigma_table(rows: Sequence[Mapping[str, Any]]) -> str:
     return aligned(lines)
 
 
+def gaps_table(motions: int) -> str:
+    """Errors of the filtered acceleration of smooth motions with a gap every half second: away from gaps, near gaps in rows that stay, in rows left out."""
+    lines: list[Sequence[str]] = [("step", "gap, ms", "away, rad/s^2", "rows that stay near gaps", "rows left out", "left out by gap, ms")]
+    study, inner = settings(), slice(RATE // 10, -RATE // 10)
+    for per_turn in (100_000, *STEPS[::2]):
+        step = 2 * np.pi / per_turn
+        for gap in (1, 10, 50, 100, 250, 1000):
+            found = []
+            for seed in range(motions):
+                moved = motion("smooth", seed)
+                starts = np.arange(RATE // 4, len(moved.q) - RATE // 4 - gap, RATE // 2)
+                missing = np.zeros(len(moved.q), dtype=bool)
+                missing[(starts[:, None] + np.arange(gap)).ravel()] = True
+                counts = np.where(missing[:, None], np.nan, quantised(moved.q, step, seed))
+                reading = read_counts(counts, RATE, step)
+                read = filtered_states(reading.q, RATE, replace(study.signals, median=1))
+                error = np.abs(read.qdd - filtered_states(moved.q, RATE, study.signals).qdd)[inner]
+                unknown = reading.unknown.any(axis=1)[inner]
+                near, beside = (maximum_filter1d(missing, 2 * round(x * RATE) + 1)[inner] for x in (0.02, 0.08))
+                cases = (~beside, near & ~unknown, unknown)
+                found.append([*(rms(error[case]) if case.any() else np.nan for case in cases), 1e3 * unknown.sum() / RATE / len(starts)])
+            away, stay, left, lost = np.median(found, axis=0)
+            lines.append((f"2 pi/{per_turn}", f"{1e3 * gap / RATE:g}", f"{away:.3g}", f"{stay:.3g}", f"{left:.3g}", f"{lost:.0f}"))
+    return aligned(lines)
+
+
 def main() -> None:
     """Compute what is missing, print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -249,6 +278,8 @@ def main() -> None:
     given = parser.parse_args()
     file = Path("counts_simulated_runs.jsonl")
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    if "gaps" in given.parts:
+        print(gaps_table(given.motions))
     for part, make, count in (("rows", rows_of, given.motions), ("sigma", sigma_of, given.records)):
         if part not in given.parts:
             continue

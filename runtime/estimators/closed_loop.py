@@ -146,7 +146,10 @@ class ClosedLoop:
 
     def measured(self) -> Observation:
         """Y = W X + rho of the measured positions on the rows of the loop, which it carries along."""
-        states = [observed_states(self.model, p.record.q, p.record.rate, p.selection.signals, name=p.record.name) for p in self.parts]
+        states = [
+            observed_states(self.model, p.record.q, p.record.rate, p.selection.signals, missing=p.record.missing, name=p.record.name)
+            for p in self.parts
+        ]
         observation = self._observed([replace(s, errors=None) for s in states])
         observation = replace(observation, closed_loop=LoopRows(self, np.arange(len(observation.Y))))
         if all(s.errors is None for s in states):
@@ -267,7 +270,7 @@ def _reference(model: GeneratedModel, records: Sequence[Record], k: int, control
     """What the controller followed in record k, at its rate."""
     record = records[k]
     if reference == "measured":
-        states = observed_states(model, record.q, record.rate, study.signals, name=record.name)
+        states = observed_states(model, record.q, record.rate, study.signals, missing=record.missing, name=record.name)
         if controller.record_every == 1:
             return Reference(controller.rate, states.q, states.qd, states.qdd)
         ticks = np.arange((len(record) - 1) * controller.record_every + 1) / controller.record_every

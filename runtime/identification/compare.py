@@ -178,7 +178,10 @@ def columns_text(result: Identification) -> str:
 
 def _opened(model: GeneratedModel, candidate: Candidate) -> tuple[Study, list[Record], list[Record]]:
     if isinstance(candidate, Study):
-        return candidate, read_records(candidate.record, model), read_records(candidate.validate.record, model)
+        own, unseen = (
+            read_records(x, model, missing=candidate.signals.admits_missing) for x in (candidate.record, candidate.validate.record)
+        )
+        return candidate, own, unseen
     study, records, further = candidate
     own, unseen = ([x] if isinstance(x, Record) else list(x) for x in (records, further))
     return study, own, unseen

@@ -33,7 +33,7 @@ from runtime.identification.payload import load_columns
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.model.inertia import physical_model
-from runtime.observation.observation import Observation, decimated_torque, observation_from_states, stack
+from runtime.observation.observation import Observation, certain, decimated_torque, observation_from_states, stack
 from runtime.observation.qr_factor import triangularise
 from runtime.observation.rows import select_rows
 from runtime.observation.states import observed_states
@@ -140,8 +140,8 @@ def drive_gains(
 
 def _with_motors(model: GeneratedModel, record: Record, study: Study, drives: Drives) -> Observation:
     """W and Y of a record, and behind W one column per motor: its share in the torque of the joint of the row."""
-    states = observed_states(model, record.q, record.rate, study.signals, name=record.name)
-    selection = select_rows(record, states.qd, study.signals, study.rows)
+    states = observed_states(model, record.q, record.rate, study.signals, missing=record.missing, name=record.name)
+    selection = certain(model, states, select_rows(record, states.qd, study.signals, study.rows))
     observation = observation_from_states(model, states, decimated_torque(record.tau, selection), selection, files=record.files)
     motor = drives.motor_command(record.tau) * drives.torque_constant
     mask = selection.mask.ravel()

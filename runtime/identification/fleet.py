@@ -326,7 +326,8 @@ class Packer:
             study = located(*study_of(job.record))
             if not study.record:
                 raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=job.record)
-            records, further = (tuple(read_records(settings, model)) for settings in (study.record, study.validate.record))
+            missing = study.signals.admits_missing
+            records, further = (tuple(read_records(own, model, missing=missing)) for own in (study.record, study.validate.record))
         except (InputError, OSError) as e:
             return Finished(Row(job.name, job.robot, job.record, message=str(e)))
         return Parcel(job, text, study, records, further, self.files, self.folder / job.name)

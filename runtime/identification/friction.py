@@ -42,7 +42,7 @@ from runtime.identification.residuals import correlation_time, residual_correlat
 from runtime.model.generated import GeneratedModel, elements_of, joint_labels, require
 from runtime.model.inertia import physical_model
 from runtime.observation.filters import decimated
-from runtime.observation.observation import decimated_torque, observation_from_states
+from runtime.observation.observation import certain, decimated_torque, observation_from_states
 from runtime.observation.rows import select_rows
 from runtime.observation.states import observed_states
 from runtime.records.record import Record
@@ -177,8 +177,8 @@ def own_friction(model: GeneratedModel, j: int) -> list[int]:
 
 def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, number: int) -> list[Terms]:
     """Terms of every joint of one record."""
-    states = observed_states(model, record.q, record.rate, study.signals, name=record.name)
-    selection = select_rows(record, states.qd, study.signals, study.rows)
+    states = observed_states(model, record.q, record.rate, study.signals, missing=record.missing, name=record.name)
+    selection = certain(model, states, select_rows(record, states.qd, study.signals, study.rows))
     observation = observation_from_states(model, states, decimated_torque(record.tau, selection), selection)
     window = states[selection.samples]
     X = np.array([fit[name] if name in fit.names else 0.0 for name in model.BASE_PARAMETERS])

@@ -97,7 +97,7 @@ def identify(
     provenance = {**origin(records), **(provenance or {})}
     simulator = simulator or simulator_of(model, study)
     if further is None:
-        further = records_or_streams(study.validate.record, model, study.stream)
+        further = records_or_streams(study.validate.record, model, study.stream, missing=study.signals.admits_missing)
     observed = partial(method_observation, model, study=study)
     observation = observed(records, simulator=simulator)
     at("least squares, essential parameters")

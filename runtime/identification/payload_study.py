@@ -80,7 +80,7 @@ def payload_study(
     """
     settings = study.payload
     if settings is not None and loaded is None:
-        loaded = read_records(settings.record, model)
+        loaded = read_records(settings.record, model, missing=study.signals.admits_missing)
     if settings is None or not loaded:
         raise SettingsError("no record with the load; name it in payload.record", path=("payload", "record"))
     method = linear_companion(study.estimate)

@@ -93,6 +93,11 @@ class Drives:
         """u = R'^-1 tau / torque_constant, A, V or N m; tau, shape (N, n), N m or N."""
         return np.asarray(np.linalg.solve(self._matrix("torque").T, self._checked(tau).T).T / self.torque_constant)
 
+    @property
+    def motion(self) -> Array:
+        """Turns of the motors by turns of the joints, shape (n, n): R, or its diagonal where positions are taken as decoupled."""
+        return self._matrix("position")
+
     def _matrix(self, quantity: str) -> Array:
         return self.ratio if self.coupling in ("both", quantity) else np.diag(np.diag(self.ratio))
 

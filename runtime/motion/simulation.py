@@ -323,7 +323,7 @@ def simulate(
         raise InputError("the study has no section `controller`; it says law, rate and reference of the closed loop")
     folder, index = Path(folder or ""), controller.reference.record
     if records is None:
-        records = read_records(study.record, model, folder=folder) if index is not None else ()
+        records = read_records(study.record, model, folder=folder, missing=study.signals.admits_missing) if index is not None else ()
     X = parameters_of(model, controller)
     reference = reference_of(controller, model, records=records, folder=folder)
     start = records[index].q[0] if index is not None and controller.start is None else None

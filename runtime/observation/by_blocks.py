@@ -29,6 +29,7 @@ from runtime.observation.streaming_filters import (
     position_stage,
     velocity_stage,
 )
+from runtime.records.missing import COUNTS, Missing, require_positions
 from runtime.records.stream import Queue, Stream, recut
 from runtime.settings.study import Signals, Study
 
@@ -88,10 +89,11 @@ def layout(model: GeneratedModel, stream: Stream, study: Study, constants: Mappi
             file=stream.name,
         )
     at = Layout(start, stop, factor, int(instants[0]), K, (), (), np.inf, -np.inf, {})
-    counts, fast, shown, k = np.zeros(n, dtype=int), np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
+    counts, fast, known, shown, k = *np.zeros((4, n), dtype=int), 0
     counted = CountStage(len(stream), stream.rate, signals, stream.name) if signals.reader == "counts" else None
-    for t, mask, certain in _instants(model, stream, study, at, constants, counted):
+    for t, mask, of_state, certain in _instants(model, stream, study, at, constants, counted):
         fast += mask.sum(axis=1)
+        known += (mask & of_state).sum(axis=1)
         mask = mask & certain
         counts += mask.sum(axis=1)
         shown += mask[:, : max(SHOWN - k, 0)].sum(axis=1)
@@ -101,7 +103,7 @@ def layout(model: GeneratedModel, stream: Stream, study: Study, constants: Mappi
             at = replace(at, t0=min(at.t0, float(used[0])), t1=max(at.t1, float(used[-1])))
     dropped = {"trim": (2 * rows.trim,) * n, "low_speed": tuple((K - 2 * rows.trim - fast).tolist()), "mask": (0,) * n}
     if signals.reader == "counts":
-        dropped["direction"] = tuple((fast - counts).tolist())
+        dropped["missing"], dropped["direction"] = tuple((fast - known).tolist()), tuple((known - counts).tolist())
     if not counts.any():
         raise InputError(nothing_left(dropped, K), file=stream.name)
     findings = sentences(counted.findings, stream.name) if counted else ()
@@ -110,8 +112,9 @@ def layout(model: GeneratedModel, stream: Stream, study: Study, constants: Mappi
 
 def _instants(
     model: GeneratedModel, stream: Stream, study: Study, at: Layout, constants: Mapping[str, float], counts: CountStage | None
-) -> Iterator[tuple[Array, Array, Array]]:
-    """Time (k,) of the kept instants, rows used but for their direction, and rows of known direction, bool (n, k), by blocks."""
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Time (k,) of the kept instants, rows used but for state and direction, bool (n, k), instants of known state, (k,), and rows in which both are
+    known, (n, k), by blocks."""
     speeds = per_joint(study.rows.low_speed, stream.n, "rows.low_speed")
     k = 0
     if speeds.any() or counts is not None:
@@ -123,7 +126,7 @@ def _instants(
         mask = _mask(k, qd[kept], speeds, study.rows.trim, at)
         k += mask.shape[1]
         states = _states(model, study.signals, qd[kept], qd[kept], qd[kept], s[kept])
-        yield t[kept], mask, certain_rows(model, states, constants)
+        yield t[kept], mask, np.isfinite(s[kept]).all(axis=1), certain_rows(model, states, constants)
 
 
 def observed_blocks(
@@ -187,10 +190,13 @@ def filtered_blocks(
             t, q, qd, qdd, s, tau = (queue.take(count) for queue in queues)
             yield t, q, qd, qdd, s, tau
 
-    for t, q, tau in stream.blocks():
+    for t, q, tau, missing in stream.blocks():
         s = np.empty((len(t), 0))
-        if counts is not None:
-            q, s = counts.push(encoder_position(q, drives))
+        at_columns = Missing(missing, stream.follows) if missing.any() else None
+        if counts is None:
+            require_positions(at_columns, "reader: lowpass", stream.name, COUNTS)
+        else:
+            q, s = counts.push(encoder_position(q, drives, None if at_columns is None else at_columns.at_encoders(drives)))
             q = q if drives is None or not len(q) else drives.joint_position(q)
         q = position.push(q)
         qd = velocity.push(q) if len(q) else q

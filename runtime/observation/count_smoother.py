@@ -44,6 +44,8 @@ WINDOW, OF_RECORD = 0.05, 3.0
 """Length of time that has a jerk density of its own, s, and the weight of the whole record in it, in determined jerks."""
 RANGE, CONDITION = 1e-3, 1e-9
 """Least share of a window's density in that of the record; least density that a Cholesky factor resolves, by h^5."""
+GAP = 10.0
+"""Deviation of a missing sample, ranges of the counts: as good as none, but the precision of a long gap remains one that Cholesky factors."""
 SPACING = 0.3
 """Distance of bounds inside an interval, in units of the time r^(-1/5) in which white jerk of density r crosses it."""
 
@@ -85,16 +87,17 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
     known = np.zeros((n, basis.padded), dtype=bool)
     known[:, :N] = np.isfinite(counts)
     origin = np.asarray(np.round(np.nanmean(counts, axis=1)))[:, None]
-    y = np.zeros(known.shape)
+    y, rest = np.zeros(known.shape), np.zeros(known.shape)  # rest : precision of missing samples
     y[:, :N] = np.where(known[:, :N], counts - origin, 0.0)
+    rest[:, :N] = np.where(known[:, :N], 0.0, (GAP * (np.ptp(y, axis=1, keepdims=True) + 1)) ** -2)
     given = LINES if isinstance(lines, str) else lines
     errors = [LineErrors(given, 0, np.zeros(0), given)] * n
-    tau, nu = _from_changes(y, known, errors)
+    tau, nu = _from_changes(y, known, rest, errors, basis.m)
     c, density = _passed(basis, tau, nu, _first_density(y[:, :N]))
     if isinstance(lines, str):
-        errors, density = line_errors(basis, y, known, c, density, Ts, estimate=lines == "estimated")
+        errors, density = line_errors(basis, y, known, rest, c, density, Ts, estimate=lines == "estimated")
         if any(each.deviation > LINES for each in errors):
-            tau, nu = _from_changes(y, known, errors)
+            tau, nu = _from_changes(y, known, rest, errors, basis.m)
             c, density = _passed(basis, tau, nu, density.mean(axis=1))
     sites = np.flatnonzero(_sites(y, known, density, Ts))
     of, value = sites // basis.padded, y.ravel()[sites]
@@ -106,9 +109,10 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
             high[of == j] += each.of(number)
     e2 = np.array([each.left for each in errors])[of] ** 2
     t, u = tau.ravel()[sites], nu.ravel()[sites]
-    tau, pull, x = np.zeros(y.shape), np.zeros(y.shape), basis.at_samples(c)
+    tau, pull, x, gaps = rest.copy(), np.zeros(y.shape), basis.at_samples(c), np.flatnonzero(rest)
     for _ in range(PASSES):
         tau.ravel()[sites], pull.ravel()[sites] = t, u - t * x.ravel()[sites]
+        pull.ravel()[gaps] = -rest.ravel()[gaps] * x.ravel()[gaps]
         factor = Factor.of(basis.precision(tau, density))
         c = c + factor.solve(basis.gradient(pull, density, c))
         Z = factor.inverse()
@@ -149,14 +153,14 @@ def _passed(basis: Basis, tau: Array, nu: Array, density: Array) -> tuple[Array,
 
 
 def _sites(y: Array, known: Array, density: Array, Ts: float) -> Array:
-    """Samples whose bounds count: both sides of every change, and in between as often as the motion forgets, bool of the shape of y.
+    """Samples whose bounds count: both sides of every change and gap, and in between as often as the motion forgets, bool of the shape of y.
 
     Bounds of samples close together are one bound. Taken as many, each would see the others as independent knowledge.
     """
     sites = np.zeros(y.shape, dtype=bool)
     for j in range(len(y)):
         at = np.flatnonzero(known[j])
-        change = np.flatnonzero(np.diff(y[j, at]))
+        change = np.flatnonzero((np.diff(y[j, at]) != 0) | (np.diff(at) > 1))
         sites[j, at[[0, -1]]] = sites[j, at[change]] = sites[j, at[change + 1]] = True
         ends = np.concatenate([[0], np.repeat(change, 2) + np.tile([0, 1], len(change)), [len(at) - 1]]).reshape(-1, 2)
         spacing = SPACING * density[j].mean() ** -0.2 / Ts
@@ -185,13 +189,14 @@ def _first_density(y: Array) -> Array:
     return np.asarray((np.ptp(y, axis=1) + 1) ** 2 * 1e8)
 
 
-def _from_changes(y: Array, known: Array, errors: Sequence[LineErrors]) -> tuple[Array, Array]:
-    """First sites: at the two samples around a change of the count; a hundredth of an interval at every other sample."""
-    tau = np.where(known, 0.06, 0.0)
+def _from_changes(y: Array, known: Array, rest: Array, errors: Sequence[LineErrors], near: int) -> tuple[Array, Array]:
+    """First sites: at the two samples around a change of the count, at most `near` missing samples apart; a hundredth of an interval at every other
+    sample, `rest` where it is missing."""
+    tau = np.where(known, 0.06, rest)
     nu = tau * y
     for j in range(len(y)):
         at = np.flatnonzero(known[j])
-        e = np.flatnonzero(np.diff(y[j, at]))
+        e = np.flatnonzero((np.diff(y[j, at]) != 0) & (np.diff(at) <= near + 1))
         if len(e) < 2:
             continue
         before, after = at[e], at[e + 1]

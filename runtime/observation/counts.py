@@ -4,6 +4,7 @@
     reading.q, reading.s_q, reading.sign, reading.findings
 
 Records longer than STRETCH samples are read in stretches that overlap by MARGIN samples on either side: memory and time are linear in their length.
+Samples without a count follow from their neighbours by the posterior; in gaps where it does not tell the position to half a step the state is unknown.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import binary_opening, binary_propagation, maximum_filter1d
 from scipy.special import erf
 
 from runtime.observation.count_smoother import Lines, Smoothed, smoothed
-from runtime.observation.encoder_lattice import SHAKEN, Lattice, lattice, shaken_share, to_and_fro, unwrapped
+from runtime.observation.encoder_lattice import SHAKEN, Lattice, Unwrapping, lattice, shaken_share, to_and_fro
 
 Array = np.ndarray
 
@@ -25,6 +27,12 @@ ANYWHERE = 12**-0.5
 """Error of a line where the motion shakes, steps: a change of the count then says as much as the count itself, a position within one step."""
 TURNED = 4e-3
 """Time ahead of a count that goes to and fro and behind it in which both directions occur, s: a quarter of a period of usual cut-offs."""
+UNKNOWN = 0.5
+"""Deviation of a missing position, steps, above which the state is unknown in the whole gap: the bound that a count would be."""
+REACH = 0.02
+"""Time ahead of an unknown state and behind it that filters bring it to, s: a period of usual cut-offs."""
+RESTS = 0.05
+"""Longest gap, s, in which an encoder whose count never changes is taken as at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +47,8 @@ class Reading:
         Its deviations.
     jerk_density : ndarray, shape (n,), rad/s^3/sqrt(Hz) or m/s^3/sqrt(Hz)
         Root of the mean density r of the white jerk.
+    unknown : ndarray of bool, shape (N, n)
+        Gaps in which the counts around them do not tell the state, and the samples that filters bring it to.
     step, phase : ndarray, shape (n,), rad or m
         Lattice of the encoders.
     findings : tuple of str
@@ -51,6 +61,7 @@ class Reading:
     s_q: Array
     s_qd: Array
     s_qdd: Array
+    unknown: Array
     jerk_density: Array
     step: Array
     phase: Array
@@ -130,18 +141,22 @@ def read_counts(
         No count changes; a step that is not positive or larger than the motion; positions off the lattice; counts that jump.
     """
     known = lattice(position, step, phase, name=name)
-    counts, said = unwrapped(known.counts(position), name=name)
-    return _reading(counts, rate, known, lines, said)
+    unwrapping = Unwrapping(position.shape[1], name)
+    counts = unwrapping(known.counts(position))
+    return _reading(counts, rate, known, lines, unwrapping.findings)
 
 
 def _reading(counts: Array, rate: float, known: Lattice, lines: Lines, said: Sequence[str]) -> Reading:
     N, n = counts.shape
-    states = [np.empty((N, n)) for _ in range(6)]
-    density, parts, found = np.zeros(n), [], dict.fromkeys((*known.findings, *said))
+    states, unknown = [np.empty((N, n)) for _ in range(6)], np.empty((N, n), dtype=bool)
+    density, parts, found, gaps = np.zeros(n), [], dict.fromkeys((*known.findings, *said)), Gaps(n)
     for begin, first, stop, end in stretches(N):
-        part, read = read_stretch(counts[begin:end], rate, lines)
+        kept = slice(first - begin, stop - begin)
+        part, read, left = read_stretch(counts[begin:end], rate, lines, gaps.rest(counts))
+        unknown[first:stop] = left[kept]
+        gaps.take(counts[first:stop], left[kept])
         for x, own in zip(states, read, strict=True):
-            x[first:stop] = own[first - begin : stop - begin]
+            x[first:stop] = own[kept]
         if part is not None:
             part = replace(part, begin=begin, first=first, stop=stop)
             density[part.moving] += part.smoothed.density.mean(axis=1) * (stop - first) / N
@@ -152,23 +167,38 @@ def _reading(counts: Array, rate: float, known: Lattice, lines: Lines, said: Seq
         if i == 0:
             x += known.phase
     q, qd, qdd, s_q, s_qd, s_qdd = states
-    jerk = np.sqrt(density) * known.step
-    return Reading(q, qd, qdd, s_q, s_qd, s_qdd, jerk, known.step, known.phase, tuple(found), tuple(parts))
+    jerk, findings = np.sqrt(density) * known.step, (*found, *gaps.findings(rate))
+    return Reading(q, qd, qdd, s_q, s_qd, s_qdd, unknown, jerk, known.step, known.phase, findings, tuple(parts))
 
 
-def read_stretch(counts: Array, rate: float, lines: Lines) -> tuple[Part | None, list[Array]]:
-    """Posterior of counts, shape (N, n), and q, qd, qdd, s_q, s_qd, s_qdd, shape (N, n) each, in steps; None where nothing moves.
+def read_stretch(counts: Array, rate: float, lines: Lines, rest: Array) -> tuple[Part | None, list[Array], Array]:
+    """Posterior of counts, shape (N, n), None where nothing moves; q, qd, qdd, s_q, s_qd, s_qdd in steps, and where the state is unknown, (N, n) each.
 
-    An encoder whose count never changes rests in the middle of its interval. Where one count goes to and fro the lines of all encoders are widened,
-    since joints share a controller, and directions near such passages are uncertain.
+    An encoder whose count never changes rests in the middle of its interval, one without a count at `rest`, shape (n,). Where one count goes to and fro
+    the lines of all encoders are widened, since joints share a controller, and directions near such passages are uncertain.
     """
     N, n = counts.shape
     k = np.ascontiguousarray(counts.T)
-    moving = np.flatnonzero(np.nanmax(k, axis=1) > np.nanmin(k, axis=1))
+    least, most = (f.reduce(k, axis=1) for f in (np.fmin, np.fmax))  # nan: no count at all
+    moving = np.flatnonzero(most > least)
     states = [np.full((N, n), value) for value in (0.0, 0.0, 0.0, 12**-0.5, 0.0, 0.0)]
-    states[0][:] = np.nanmean(k, axis=1)
-    if not len(moving):
-        return None, states
+    states[0][:] = np.where(np.isfinite(least), least, rest)
+    part = _moved(k, moving, states, rate, lines) if len(moving) else None
+    missing = np.isnan(counts)
+    unknown = missing & (states[3] > UNKNOWN)
+    for j in np.flatnonzero(missing.any(axis=0)):
+        if most[j] > least[j]:
+            unknown[:, j] = binary_propagation(unknown[:, j], mask=missing[:, j])
+        else:
+            unknown[:, j] = binary_opening(missing[:, j], np.ones(round(RESTS * rate) + 2))
+    if unknown.any():
+        unknown = maximum_filter1d(unknown, 2 * round(REACH * rate) + 1, axis=0)
+    return part, states, unknown
+
+
+def _moved(k: Array, moving: Array, states: Sequence[Array], rate: float, lines: Lines) -> Part:
+    """Posterior of the encoders that move, of counts k, shape (n, N), and their columns of the states."""
+    N = k.shape[1]
     known = [np.flatnonzero(np.isfinite(k[j])) for j in moving]
     shaken = isinstance(lines, str) and max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
     part = Part(smoothed(k[moving], 1 / rate, lines=ANYWHERE if shaken else lines), 0, 0, N, moving)
@@ -181,7 +211,44 @@ def read_stretch(counts: Array, rate: float, lines: Lines) -> tuple[Part | None,
             turned[max(a - round(TURNED * rate), 0) : b + round(TURNED * rate)] = True
         deviation = 3 * np.abs(states[1][turned, j])  # speeds of both signs: their deviation is above their mean
         states[4][turned, j] = np.maximum(states[4][turned, j], deviation)
-    return part, states
+    return part
+
+
+class Gaps:
+    """Samples without a count of n encoders, as they come by."""
+
+    def __init__(self, n: int) -> None:
+        self.samples, self.unknown, self.run, self.longest = np.zeros((4, n), dtype=int)
+        self.last = np.full(n, np.nan)  # last count known
+
+    def rest(self, counts: Array) -> Array:
+        """The last counts known, shape (n,), ahead of the record the first of `counts`, shape (N, n)."""
+        first = counts[np.isfinite(counts).argmax(axis=0), np.arange(counts.shape[1])]
+        return np.where(np.isnan(self.last), first, self.last)
+
+    def take(self, counts: Array, unknown: Array) -> None:
+        """The next counts and where the state is unknown, shape (B, n) each."""
+        missing = np.isnan(counts)
+        self.samples += missing.sum(axis=0)
+        self.unknown += unknown.sum(axis=0)
+        for j in range(counts.shape[1]):
+            known = np.flatnonzero(~missing[:, j])
+            between = np.diff(known, prepend=-1 - self.run[j], append=len(counts)) - 1
+            self.longest[j] = max(self.longest[j], between.max())
+            self.run[j] = between[-1] if len(known) else self.run[j] + len(counts)
+            self.last[j] = counts[known[-1], j] if len(known) else self.last[j]
+
+    def findings(self, rate: float) -> tuple[str, ...]:
+        """How many samples are missing and what became of them, a sentence for each encoder that misses any."""
+        return tuple(
+            f"encoder {j + 1}: {self.samples[j]} samples are missing, at most {self.longest[j]} in a row ({self.longest[j] / rate:.3g} s); "
+            + (
+                f"where the counts around a gap do not tell the position to half a step, rows are left out ({self.unknown[j]} samples)"
+                if self.unknown[j]
+                else "the counts around them tell the motion there"
+            )
+            for j in np.flatnonzero(self.samples)
+        )
 
 
 def stretches(N: int) -> list[tuple[int, int, int, int]]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from runtime.errors import SettingsError
-from runtime.observation.counts import read_stretch, stretches
-from runtime.observation.encoder_lattice import Lattice, lattice, unwrapped
+from runtime.observation.counts import Gaps, read_stretch, stretches
+from runtime.observation.encoder_lattice import Lattice, Unwrapping, lattice
 from runtime.records.stream import Queue
 from runtime.settings.study import Signals
 
@@ -14,9 +13,9 @@ Array = np.ndarray
 
 
 class CountStage:
-    """Positions at the encoders, shape (B, n), go in by pieces; positions read and deviations of velocities come out.
+    """Positions at the encoders, shape (B, n), nan where they are missing, go in by pieces; positions read and deviations of velocities come out.
 
-    Step and phase are those of the first stretch. findings : what the stretches say, as in `runtime.observation.counts`.
+    Step and phase are those of the first stretch.
 
     Parameters
     ----------
@@ -33,10 +32,18 @@ class CountStage:
         self.left = stretches(samples)
         self.held, self.begin = Queue(), 0  # samples from `begin` of the record on
         self.lattice: Lattice | None = None
-        self.findings: dict[str, None] = {}
+        self.said: dict[str, None] = {}
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What the stretches that are complete say, as in `runtime.observation.counts`."""
+        if self.lattice is None:
+            return ()
+        found = (*self.lattice.findings, *self.unwrapping.findings, *self.said, *self.gaps.findings(self.rate))
+        return tuple(dict.fromkeys(found))
 
     def push(self, position: Array) -> tuple[Array, Array]:
-        """q and s_qd, shape (k, n), of the stretches that are complete."""
+        """q and s_qd, shape (k, n), of the stretches that are complete; s_qd is infinite where the state is unknown."""
         self.held.put(position)
         n = position.shape[1]
         q, s = [np.empty((0, n))], [np.empty((0, n))]
@@ -46,15 +53,14 @@ class CountStage:
             own = x[: end - begin]
             if self.lattice is None:
                 self.lattice = lattice(own, self.step, name=self.name)
-                self.findings.update(dict.fromkeys(self.lattice.findings))
-            counts, said = unwrapped(self.lattice.counts(own), name=self.name)
-            if said:
-                raise SettingsError(f"{said[0]}; such a record is read as a whole, set stream: off", path=("signals", "reader"))
-            part, states = read_stretch(counts, self.rate, self.lines)
-            self.findings.update(dict.fromkeys(part.findings if part else ()))
+                self.unwrapping, self.gaps = Unwrapping(n, self.name), Gaps(n)
+            counts = self.unwrapping(self.lattice.counts(own), self.left[0][0] if self.left else end)
+            part, states, unknown = read_stretch(counts, self.rate, self.lines, self.gaps.rest(counts))
+            self.said.update(dict.fromkeys(part.findings if part else ()))
             kept = slice(first - begin, stop - begin)
+            self.gaps.take(counts[kept], unknown[kept])
             q.append(self.lattice.position(states[0][kept]))
-            s.append(states[4][kept] * self.lattice.step)
+            s.append(np.where(unknown[kept], np.inf, states[4][kept] * self.lattice.step))
             if self.left:
                 self.held.put(x[self.left[0][0] - begin :])
                 self.begin = self.left[0][0]

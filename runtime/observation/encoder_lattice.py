@@ -72,7 +72,7 @@ def lattice(
     for j in range(n):
         x, label = position[np.isfinite(position[:, j]), j], f"encoder {j + 1}"
         if not len(x):
-            raise InputError(f"{label}: no sample is known", file=name)
+            raise InputError(f"{label}: no sample is known; leave its joint out of the robot, or record its positions", file=name)
         steps[j], said = _step(x, None if step is None else float(step[j]), label, name)
         phases[j] = _phase(x, steps[j]) if phase is None else phase[j]
         counts = np.round((x - phases[j]) / steps[j])
@@ -129,31 +129,61 @@ def shaken_share(counts: Array) -> float:
     return len(to_and_fro(counts)) / max(int(np.count_nonzero(np.diff(counts))), FEWEST)
 
 
-def unwrapped(counts: Array, *, name: str = "record") -> tuple[Array, tuple[str, ...]]:
-    """Counts, shape (N, n), without wraps at 2^16 or 2^32; InputError where they jump otherwise."""
-    findings = []
-    for j in range(counts.shape[1]):
-        known = np.flatnonzero(np.isfinite(counts[:, j]))
-        k = counts[known, j]
-        change = np.diff(k)
-        near = np.maximum(np.abs(np.roll(change, 1)), np.abs(np.roll(change, -1)))
-        near = np.maximum(near, np.maximum(np.abs(np.roll(change, 2)), np.abs(np.roll(change, -2))))
-        jumps = np.flatnonzero(np.abs(change) > JUMP * (near + 2) * np.diff(known))
-        if not len(jumps):
-            continue
-        wrap = next((w for w in WRAPS if (np.abs(np.abs(change[jumps]) - w) <= 2 * (near[jumps] + 2)).all()), None)
-        if wrap is None:
-            raise InputError(
-                f"encoder {j + 1}: the count jumps by {change[jumps[0]]:.0f} at sample {known[jumps[0] + 1]}"
-                f"{f', {len(jumps)} times in all' if len(jumps) > 1 else ''}; it was reset or lost there, cut the record at such samples",
-                file=name,
-            )
-        turns = np.zeros(len(k))
-        turns[jumps + 1] = -np.sign(change[jumps]) * wrap
-        counts = counts.copy()
-        counts[known, j] = k + np.cumsum(turns)
-        findings.append(f"encoder {j + 1}: the count wraps at 2^{int(np.log2(wrap))} {len(jumps)} times; it was unwrapped")
-    return counts, tuple(findings)
+class Unwrapping:
+    """Counts of n encoders without wraps at 2^16 or 2^32, by stretches that begin where the one before has known samples.
+
+    Parameters
+    ----------
+    n : int
+    name : str
+        What errors call the record.
+    """
+
+    def __init__(self, n: int, name: str) -> None:
+        self.name, self.begin, self.end = name, 0, 0
+        self.turned = np.zeros(n)  # counts to be added at sample `begin`
+        self.wraps: dict[int, list[int]] = {}  # period and number of wraps, by encoder
+
+    def __call__(self, counts: Array, next_begin: int = 0) -> Array:
+        """Counts, shape (N, n), from sample `begin` on without wraps; the next stretch begins at `next_begin`. InputError where they jump otherwise."""
+        counts, N = counts + self.turned, len(counts)
+        for j in range(counts.shape[1]):
+            known = np.flatnonzero(np.isfinite(counts[:, j]))
+            k = counts[known, j]
+            change = np.diff(k)
+            near = np.maximum(np.abs(np.roll(change, 1)), np.abs(np.roll(change, -1)))
+            near = np.maximum(near, np.maximum(np.abs(np.roll(change, 2)), np.abs(np.roll(change, -2))))
+            near = (near + 2) * np.diff(known)
+            jumps = np.flatnonzero(np.abs(change) > JUMP * near)
+            if not len(jumps):
+                continue
+            size, moved, at = change[jumps], 2 * near[jumps], known[jumps + 1] + self.begin
+            periods = self.wraps[j][:1] if j in self.wraps else WRAPS
+            wrap = next((w for w in periods if (np.abs(np.abs(size) - w) <= moved).all()), None)
+            if wrap is None:
+                is_wrap = np.any([np.abs(np.abs(size) - w) <= moved for w in periods], axis=0)
+                first = int(np.argmin(is_wrap))
+                raise InputError(
+                    f"encoder {j + 1}: the count jumps by {size[first]:.0f} at sample {at[first]}; it was reset or lost there, cut the record at "
+                    "such samples",
+                    file=self.name,
+                )
+            turns = np.zeros(len(k))
+            turns[jumps + 1] = -np.sign(size) * wrap
+            turns = np.cumsum(turns)
+            counts[known, j] = k + turns
+            self.wraps.setdefault(j, [wrap, 0])[1] += int((at >= self.end).sum())
+            self.turned[j] += turns[min(int(np.searchsorted(known, next_begin - self.begin)), len(known) - 1)]
+        self.begin, self.end = next_begin, self.begin + N
+        return np.asarray(counts)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What wrapped, a sentence for each encoder."""
+        return tuple(
+            f"encoder {j + 1}: the count wraps at 2^{int(np.log2(wrap))} {times} times; it was unwrapped"
+            for j, (wrap, times) in sorted(self.wraps.items())
+        )
 
 
 def _step(x: Array, given: float | None, label: str, name: str) -> tuple[float, list[str]]:

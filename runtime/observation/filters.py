@@ -28,7 +28,7 @@ Array = np.ndarray
 class SpeedErrors:
     """What is known of errors of the velocities: those of the encoders are independent.
 
-    deviation : ndarray, shape (N, encoders), per s.   root : ndarray, shape (n, encoders), joint velocity per encoder velocity.
+    deviation : ndarray, shape (N, encoders), per s; infinite where counts are missing and the state is unknown.   root : ndarray, shape (n, encoders), joint velocity per encoder velocity.
     """
 
     deviation: Array
@@ -39,7 +39,13 @@ class SpeedErrors:
 
     def along(self, G: Array) -> Array:
         """Deviation of s = G qd, shape (N,); G, shape (n,)."""
-        return np.asarray(np.sqrt(self.deviation**2 @ (G @ self.root) ** 2))
+        finite = np.where(self.known[:, None], self.deviation, 0.0)
+        return np.where(self.known, np.sqrt(finite**2 @ (G @ self.root) ** 2), np.inf)
+
+    @property
+    def known(self) -> Array:
+        """Samples at which the state of every joint is known, bool, shape (N,)."""
+        return np.asarray(np.isfinite(self.deviation).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,11 +53,11 @@ class Changes:
     up: Array
 
     @classmethod
-    def of(cls, y: Array, known: Array) -> Changes:
-        """Changes by one count, of y, shape (N,)."""
+    def of(cls, y: Array, known: Array, near: int) -> Changes:
+        """Changes by one count, of y, shape (N,), at most `near` missing samples apart."""
         at = np.flatnonzero(known)
         step = np.diff(y[at])
-        e = np.flatnonzero(np.abs(step) == 1)
+        e = np.flatnonzero((np.abs(step) == 1) & (np.diff(at) <= near + 1))
         line = (y[at[e]] + y[at[e + 1]]) / 2
         return cls(at[e], at[e + 1], line, np.floor(line).astype(int), step[e] > 0)
 
@@ -113,14 +113,14 @@ def _weights(changes: Changes, speed: Array, e: Array | float) -> tuple[Array, A
 
 
 def line_errors(
-    basis: Basis, y: Array, known: Array, c: Array, density: Array, Ts: float, *, estimate: bool
+    basis: Basis, y: Array, known: Array, rest: Array, c: Array, density: Array, Ts: float, *, estimate: bool
 ) -> tuple[list[LineErrors], Array]:
     """Size of the errors of the lines of every encoder, their places where `estimate` asks for them, and the jerk density without these errors.
 
-    y, known, c, density : as in `runtime.observation.count_smoother`, c from the changes alone.
+    y, known, rest, c, density : as in `runtime.observation.count_smoother`, c from the changes alone.
     """
-    changes = [Changes.of(y[j], known[j]) for j in range(basis.n)]
-    weak = np.where(known, WEAK, 0.0), np.where(known, WEAK * y, 0.0)
+    changes = [Changes.of(y[j], known[j], basis.m) for j in range(basis.n)]
+    weak = np.where(known, WEAK, rest), WEAK * y
     speed = basis.at_samples(c, 1) * Ts
 
     def judged(sizes: Sequence[float]) -> dict[float, tuple[Array, Array]]:

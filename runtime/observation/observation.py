@@ -118,7 +118,7 @@ def observe(
     parts = []
     for record in several:
         assert isinstance(record, Record)
-        states = observed_states(model, record.q, record.rate, study.signals, name=record.name)
+        states = observed_states(model, record.q, record.rate, study.signals, missing=record.missing, name=record.name)
         selection = select_rows(record, states.qd, study.signals, study.rows, keep=keep)
         torque = decimated_torque(record.tau, selection)
         parts.append(observation_from_states(model, states, torque, selection, files=record.files, columns=columns, constants=constants))
@@ -143,7 +143,8 @@ def observation_from_states(
 ) -> Observation:
     """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated before.
 
-    Where errors of the velocities are known, rows in which the direction of dry friction is uncertain are left out as well ("direction").
+    Where errors of the velocities are known, rows in which missing positions leave the state unknown ("missing") or the direction of dry friction is
+    uncertain ("direction") are left out as well.
     columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
     """
     check_states(model, states.q, states.qd, states.qdd)
@@ -154,24 +155,35 @@ def observation_from_states(
     numbers = column_numbers(names, model.BASE_PARAMETERS)
     window = states[selection.samples]
     store = decimated_columns(model, window, selection.factor, selection.signals.decimate, constants or {}, numbers)
-    rows, dropped = selection.mask, dict(selection.dropped)
-    if states.errors is not None:
-        rows = rows & certain_rows(model, window[selection.kept], constants)
-        dropped["direction"] = tuple(int(k) for k in (selection.mask.sum(axis=1) - rows.sum(axis=1)))
-    mask = rows.ravel()
+    selection = certain(model, states, selection, constants)
+    mask = selection.mask.ravel()
     return Observation(
         W=np.compress(mask, store.reshape(len(names), n * K), axis=1).T,
         Y=torque.ravel()[mask],
-        rows=tuple(int(k) for k in rows.sum(axis=1)),
+        rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
         names=names,
         t=np.tile(selection.t, n)[mask],
         record=np.zeros(int(mask.sum()), dtype=int),
         rate=selection.rate,
-        dropped=dropped,
+        dropped=selection.dropped,
         settings=_settings(selection.signals, selection.rows, selection.factor),
         files=dict(files or {}),
         findings=states.findings,
     )
+
+
+def certain(model: GeneratedModel, states: States, selection: Selection, constants: Mapping[str, float] | None = None) -> Selection:
+    """The selection without rows in which missing positions leave the state unknown ("missing") or the direction of dry friction is uncertain
+    ("direction"); the same where errors of the velocities are not known."""
+    if states.errors is None:
+        return selection
+    known = selection.mask & states.errors[selection.samples][selection.kept].known
+    mask = known & certain_rows(model, states[selection.samples][selection.kept], constants)
+    dropped = dict(selection.dropped)
+    for reason, before, after in (("missing", selection.mask, known), ("direction", known, mask)):
+        left_out = before.sum(axis=1) - after.sum(axis=1) + np.array(dropped.get(reason, 0))
+        dropped[reason] = tuple(left_out.tolist())
+    return replace(selection, mask=mask, dropped=dropped)
 
 
 def with_torques(observation: Observation, records: Sequence[Record], torques: Sequence[Array], study: Study) -> Observation:

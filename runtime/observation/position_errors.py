@@ -30,6 +30,7 @@ from runtime.observation.observation import decimated_torque, observation_from_s
 from runtime.observation.rows import Selection, select_rows
 from runtime.observation.sign_errors import Kernels, Switch, Switched, kernels, switched, switches
 from runtime.observation.system import Observation
+from runtime.records.missing import require_positions
 from runtime.records.record import Record
 from runtime.settings.study import Study
 
@@ -170,6 +171,7 @@ def perturbation(
     """
     signals = replace(study.signals, median=study.cestac.median)
     band = bandwidth(signals, record.rate)
+    require_positions(record.missing, "the effect of steps on them", record.file)
     states = filtered_states(record.q, record.rate, signals)
     selection = select_rows(record, states.qd, signals, study.rows)
     torque = decimated_torque(record.tau, selection)

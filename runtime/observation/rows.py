@@ -17,7 +17,7 @@ from runtime.settings.study import Rows, Signals
 
 Array = np.ndarray
 
-LEAVES_OUT = {"trim": "rows.trim", "low_speed": "rows.low_speed", "mask": "the choice of samples"}
+LEAVES_OUT = {"trim": "rows.trim", "low_speed": "rows.low_speed", "mask": "the choice of samples", "missing": "positions that are missing"}
 
 
 @dataclass(frozen=True, eq=False)

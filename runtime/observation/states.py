@@ -18,6 +18,7 @@ from runtime.model.generated import GeneratedModel, drives_of
 from runtime.observation.counts import Reading, read_counts
 from runtime.observation.filters import SpeedErrors, States, filtered_states
 from runtime.observation.sign_errors import switches
+from runtime.records.missing import COUNTS, Missing, require_positions
 from runtime.settings.study import Signals
 
 Array = np.ndarray
@@ -27,7 +28,14 @@ UNCERTAIN = 0.5
 
 
 def observed_states(
-    model: GeneratedModel, q: Array, rate: float, signals: Signals, *, drives: Drives | None = None, name: str = "record"
+    model: GeneratedModel,
+    q: Array,
+    rate: float,
+    signals: Signals,
+    *,
+    drives: Drives | None = None,
+    missing: Missing | None = None,
+    name: str = "record",
 ) -> States:
     """q, qd, qdd of measured joint positions by the reader of the study.
 
@@ -43,13 +51,22 @@ def observed_states(
         Reader and filters.
     drives : Drives, optional
         Motor side; default: that of the model.
+    missing : Missing, optional
+        Samples of q that hold no position.
     name : str
         What errors call the record.
+
+    Raises
+    ------
+    InputError
+        Positions are missing that the reader needs, or are no counts (`runtime.observation.counts.read_counts`).
     """
     if signals.reader == "lowpass":
+        require_positions(missing, "reader: lowpass", name, COUNTS)
         return filtered_states(q, rate, signals)
     drives = encoder_drives(model, signals, drives)
-    reading = read_counts(encoder_position(q, drives), rate, signals.step, lines=signals.lines, name=name)
+    position = encoder_position(q, drives, None if missing is None else missing.at_encoders(drives))
+    reading = read_counts(position, rate, signals.step, lines=signals.lines, name=name)
     return replace(joint_states(reading, rate, signals, drives), findings=sentences(reading.findings, name))
 
 
@@ -62,18 +79,19 @@ def joint_states(reading: Reading, rate: float, signals: Signals, drives: Drives
     """States of a reading, joint side, through the filters of the study; drives : None for encoders on the joint side."""
     q = reading.q if drives is None else drives.joint_position(reading.q)
     states = filtered_states(q, rate, replace(signals, median=1))
-    return replace(states, errors=SpeedErrors(reading.s_qd, encoder_root(drives, q.shape[1])))
+    return replace(states, errors=SpeedErrors(np.where(reading.unknown, np.inf, reading.s_qd), encoder_root(drives, q.shape[1])))
 
 
 def certain_rows(
     model: GeneratedModel, states: States, constants: Mapping[str, float] | None = None, *, deviations: float = UNCERTAIN
 ) -> Array:
-    """Rows of every joint in which each direction of dry friction is known, bool, shape (n, K), of states (K, n) with known errors.
+    """Rows of every joint in which the state and each direction of dry friction are known, bool, shape (n, K), of states (K, n) with known errors.
 
     A row of joint j is uncertain where |s| is below `deviations` of s, s = G qd the speed of a column that switches and acts on j.
     """
     certain = np.ones(states.q.T.shape, dtype=bool)
     if states.errors is not None:
+        certain &= states.errors.known
         for switch in switches(model, model.BASE_PARAMETERS, constants, passive="left out"):
             certain[list(switch.joints)] &= np.abs(states.qd @ switch.G) >= deviations * states.errors.along(switch.G)
     return certain
@@ -91,9 +109,10 @@ def encoder_drives(model: GeneratedModel, signals: Signals, drives: Drives | Non
     return drives
 
 
-def encoder_position(q: Array, drives: Drives | None) -> Array:
-    """Positions at the encoders, shape (N, n), of joint positions q."""
-    return q if drives is None else drives.motor_position(q)
+def encoder_position(q: Array, drives: Drives | None, missing: Array | None = None) -> Array:
+    """Positions at the encoders, shape (N, n), of joint positions q; nan where they are missing, bool of that shape or (N, 0)."""
+    x = q if drives is None else drives.motor_position(q)
+    return x if missing is None or not missing.any() else np.where(missing, np.nan, x)
 
 
 def encoder_root(drives: Drives | None, n: int) -> Array:

@@ -33,6 +33,14 @@ class Conversion:
         q = q * self.positions
         return q if self.of_positions is None else self.of_positions.joint_position(q)
 
+    @property
+    def follows(self) -> Array | None:
+        """Joint j follows from column i of the positions, bool, shape (n, n); None: columns are joints."""
+        if self.of_positions is None:
+            return None
+        root = np.linalg.inv(self.of_positions.motion)
+        return np.asarray(np.abs(root) > 1e-12 * np.abs(root).max(axis=1, keepdims=True))
+
     def torque(self, tau: Array) -> Array:
         """Joint torques, N m or N; tau, shape (N, n), as in the file."""
         tau = tau * self.commands
@@ -115,14 +123,15 @@ def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
     return tuple(name for _, name in found)
 
 
-def require_finite(x: Array, names: Sequence[str], table: Table, first: int = 0) -> Array:
-    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity among them."""
+def require_finite(x: Array, names: Sequence[str], table: Table, first: int = 0, hint: str = "") -> Array:
+    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity among them; hint : what else may be done about nan."""
     if not np.isfinite(x).all():
         bad = np.argwhere(~np.isfinite(x))
         i, j = bad[0]
         column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
         raise InputError(
-            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut the record",
+            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut the record"
+            f"{f'; {hint}' if hint and np.isnan(x[i, j]) else ''}",
             file=table.file,
             column=column,
             row=table.row(first + int(i)),

@@ -16,6 +16,7 @@ from runtime.records.formats.columns import Array, Table
 from runtime.records.formats.table import open_table
 from runtime.records.joint_side import Conversion, column_names, conversion, require_alike, require_finite
 from runtime.records.labels import Label
+from runtime.records.missing import COUNTS, bridged
 from runtime.settings.record import NONE, SHORTEST, Columns, RecordSettings
 from runtime.settings.units import time_unit
 
@@ -36,11 +37,14 @@ class Samples:
         Reference.
     tau_ff, tau_known : ndarray, shape (N, n), N m or N, or None
         Feed-forward torques of the controller, and torques that do not come from the model.
+    missing : ndarray of bool, shape (N, n), or (N, 0) where none may be missing
+        Columns of positions that hold none.
     """
 
     t: Array | None
     q: Array
     tau: Array
+    missing: Array
     q_r: Array | None = None
     tau_ff: Array | None = None
     tau_known: Array | None = None
@@ -49,6 +53,7 @@ class Samples:
     def signals(self) -> dict[str, Array]:
         """What is resampled together, by name."""
         given = {key: getattr(self, key) for key in ("q", "tau", "q_r", "tau_ff", "tau_known")}
+        given |= {"missing": self.missing.astype(float)} if self.missing.any() else {}
         return {key: x for key, x in given.items() if x is not None}
 
 
@@ -74,6 +79,8 @@ class RecordFiles:
         Number of joints.
     side : Conversion
         From the columns to joint side, SI.
+    missing : bool
+        Whether positions may be missing.
     """
 
     settings: RecordSettings
@@ -84,6 +91,7 @@ class RecordFiles:
     samples: int
     n: int
     side: Conversion
+    missing: bool
 
     @property
     def first(self) -> Table:
@@ -106,15 +114,17 @@ class RecordFiles:
         parts: dict[str, Array] = {}
         for table, groups in groups_of(self.columns, self.tables):
             parts |= zip(groups, table.read(list(groups.values()), self.samples), strict=True)
-        return self._converted(0, parts)
+        return self._converted(0, parts)[0]
 
     def blocks(self, size: int) -> Iterator[Samples]:
         """The same by blocks of `size` samples."""
         asked = groups_of(self.columns, self.tables)
         streams = [table.blocks(list(groups.values()), size) for table, groups in asked]
         keys = [key for _, groups in asked for key in groups]
+        last = None
         for a, blocks in zip(range(0, self.samples, size), zip(*streams, strict=True), strict=True):
-            yield self._converted(a, dict(zip(keys, (x for block in blocks for x in block), strict=True)))
+            samples, last = self._converted(a, dict(zip(keys, (x for block in blocks for x in block), strict=True)), last)
+            yield samples
 
     def times(self, size: int) -> Iterator[Array]:
         """t by blocks of `size` samples, s; the record has a time column."""
@@ -126,13 +136,22 @@ class RecordFiles:
         for table in self.tables:
             table.close()
 
-    def _converted(self, start: int, parts: Mapping[str, Array]) -> Samples:
-        """Samples from `start` on, as the files hold them, in the joint side, SI."""
+    def _converted(self, start: int, parts: dict[str, Array], before: Array | None = None) -> tuple[Samples, Array]:
+        """Samples from `start` on, as the files hold them, in the joint side, SI, and the last positions, shape (n,), of the file.
+
+        before : positions of the file ahead of `start`.
+        """
+        missing = np.isnan(parts["q"]) if self.missing else np.empty((len(parts["q"]), 0), dtype=bool)
+        if missing.any():
+            parts["q"] = bridged(parts["q"], missing, before)
         joint_side = {"q": self.side.position, "q_r": self.side.position, "tau": self.side.torque, "tau_ff": self.side.torque}
         place = {key: (table, own) for table, groups in groups_of(self.columns, self.tables) for key, own in groups.items()}
-        checked = {key: require_finite(x, place[key][1], place[key][0], start) for key, x in parts.items() if key != "t"}
+        hints = {} if self.missing else {"q": COUNTS}
+        checked = {
+            key: require_finite(x, place[key][1], place[key][0], start, hints.get(key, "")) for key, x in parts.items() if key != "t"
+        }
         converted = {key: joint_side[key](x) if key in joint_side else self._on_joints(x) for key, x in checked.items()}
-        return Samples(t=self._time(parts["t"], start) if "t" in parts else None, **converted)
+        return Samples(t=self._time(parts["t"], start) if "t" in parts else None, missing=missing, **converted), parts["q"][-1]
 
     def _on_joints(self, known: Array) -> Array:
         """Known torques with zeros where a joint has none, shape (N, n)."""
@@ -148,7 +167,14 @@ class RecordFiles:
 
 
 def open_record(
-    settings: RecordSettings, label: Label, drives: Drives | None, folder: Path, *, joints: Sequence[str] = (), by_blocks: bool = False
+    settings: RecordSettings,
+    label: Label,
+    drives: Drives | None,
+    folder: Path,
+    *,
+    joints: Sequence[str] = (),
+    by_blocks: bool = False,
+    missing: bool = False,
 ) -> RecordFiles:
     """The files of a record, opened.
 
@@ -164,10 +190,13 @@ def open_record(
         Names of the joints of the robot, where it has them.
     by_blocks : bool
         Refuse formats that are read whole only.
+    missing : bool
+        Whether positions may be missing: nan, an empty field, a null.
     """
     opened = [open_table(path, settings.topic, settings.decimal, by_blocks=by_blocks) for path in record_files(settings, folder)]
     first, last, other = tables = places(settings, opened)
     names = column_names(settings, first, last, joints)
+    first.positions, first.missing = frozenset(names.q), missing
     counts: dict[Table, int] = {}
     widths: dict[str, int] = {}
     for table, groups in groups_of(names, tables):
@@ -187,7 +216,7 @@ def open_record(
     if "tau_known" in widths and counts[other] != samples:
         raise InputError(f"{samples} samples in {first.file}, {counts[other]} known torques; expected the same instants", file=other.file)
     hashes = dict(zip(label.files, (table.digest for table in opened), strict=True))
-    return RecordFiles(settings, label.name, hashes, tables, names, samples, n, conversion(settings, drives, first, last, n))
+    return RecordFiles(settings, label.name, hashes, tables, names, samples, n, conversion(settings, drives, first, last, n), missing)
 
 
 def places(settings: RecordSettings, opened: Sequence[Table]) -> tuple[Table, Table, Table]:

@@ -19,6 +19,7 @@ from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.clock import rate_of
 from runtime.records.labels import Label, labels
+from runtime.records.missing import Missing
 from runtime.records.named import study_of
 from runtime.records.opening import RecordFiles, Samples, drives_of, names_of, open_record
 from runtime.records.record import Record
@@ -29,7 +30,9 @@ from runtime.settings.record import RecordSettings, each_record
 IRREGULAR = 0.05  # between the rate of the settings and the median step of stamps that are resampled
 
 
-def read_record(path: str | Path | RecordSettings, model: GeneratedModel | None = None, *, folder: str | Path = ".") -> Record:
+def read_record(
+    path: str | Path | RecordSettings, model: GeneratedModel | None = None, *, folder: str | Path = ".", missing: bool = False
+) -> Record:
     """One measured record, joint side, SI.
 
     Parameters
@@ -40,6 +43,8 @@ def read_record(path: str | Path | RecordSettings, model: GeneratedModel | None 
         Emitted model of the robot; needed where a side is "motor", which its drives convert, and checked for its number of joints.
     folder : str or Path
         Where relative file names start; of a study file, those in it start where it is.
+    missing : bool
+        Whether positions may be missing, nan or an empty field, as `signals.reader: counts` admits; a study file that names this reader says so itself.
 
     Raises
     ------
@@ -51,8 +56,8 @@ def read_record(path: str | Path | RecordSettings, model: GeneratedModel | None 
     else:
         named = Path(folder) / path
         study, folder = study_of(named if named.exists() else path)
-        settings = study.record
-    records = read_records(settings, model, folder=folder)
+        settings, missing = study.record, missing or study.signals.admits_missing
+    records = read_records(settings, model, folder=folder, missing=missing)
     if len(records) != 1:
         names = ", ".join(record.name for record in records)
         raise InputError(f"{len(records)} records or pieces between gaps; read_records gives them all: {names}")
@@ -60,7 +65,7 @@ def read_record(path: str | Path | RecordSettings, model: GeneratedModel | None 
 
 
 def read_records(
-    settings: Sequence[RecordSettings], model: GeneratedModel | None = None, *, folder: str | Path | None = None
+    settings: Sequence[RecordSettings], model: GeneratedModel | None = None, *, folder: str | Path | None = None, missing: bool = False
 ) -> list[Record]:
     """Several records of one robot, no name twice; a record that `resample` splits at gaps is one record by piece.
 
@@ -70,21 +75,25 @@ def read_records(
         Emitted model of the robot, for its drives and its number of joints.
     folder : str or Path, optional
         Where relative file names start; default: the current folder.
+    missing : bool
+        Whether positions may be missing, as `signals.reader: counts` admits.
     """
     settings = each_record(tuple(settings))
     records = [
         record
         for one, label in zip(settings, labels(settings), strict=True)
-        for record in read_pieces(one, label, drives_of(model), Path(folder or ""), names_of(model))
+        for record in read_pieces(one, label, drives_of(model), Path(folder or ""), names_of(model), missing=missing)
     ]
     for record in records if model is not None else ():
         require_joints(record.n, tuple(record.files), model)
     return records
 
 
-def read_pieces(settings: RecordSettings, label: Label, drives: Drives | None, folder: Path, joints: Sequence[str] = ()) -> list[Record]:
+def read_pieces(
+    settings: RecordSettings, label: Label, drives: Drives | None, folder: Path, joints: Sequence[str] = (), *, missing: bool = False
+) -> list[Record]:
     """The record, or the records into which `resample` splits it at gaps and where time goes back."""
-    opened = open_record(settings, label, drives, folder, joints=joints)
+    opened = open_record(settings, label, drives, folder, joints=joints, missing=missing)
     try:
         samples = opened.read()
         stretches, rate, text = _uniform(opened, samples)
@@ -106,6 +115,7 @@ def read_pieces(settings: RecordSettings, label: Label, drives: Drives | None, f
             files=opened.hashes,
             time=text,
             jitter=settings.jitter,
+            missing=Missing(own["missing"] > 0, opened.side.follows) if "missing" in own else None,
         )
         for k, (stretch, own) in enumerate(zip(stretches, signals, strict=True), start=1)
     ]

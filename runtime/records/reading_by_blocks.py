@@ -63,56 +63,75 @@ class FileStream(Stream):
     def _counted(self, start: int, count: int) -> Array:
         return np.arange(start, start + count) / self.rate
 
-    def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
-        """t (B,), q (B, n), tau (B, n), joint side, SI."""
+    def blocks(self) -> Iterator[tuple[Array, Array, Array, Array]]:
+        """t (B,), q (B, n), tau (B, n), joint side, SI, and the columns without a position."""
         start = 0
         for x in self.opened.blocks(self.block):
             known = 0.0 if x.tau_known is None else x.tau_known
-            yield self._counted(start, len(x.q)) if x.t is None else x.t, x.q, x.tau - known
+            yield self._counted(start, len(x.q)) if x.t is None else x.t, x.q, x.tau - known, x.missing
             start += len(x.q)
 
 
 def open_stream(
-    settings: RecordSettings, model: GeneratedModel | None = None, *, folder: str | Path | None = None, block: int = BLOCK
+    settings: RecordSettings,
+    model: GeneratedModel | None = None,
+    *,
+    folder: str | Path | None = None,
+    block: int = BLOCK,
+    missing: bool = False,
 ) -> FileStream:
     """The record that the settings describe, to be read by blocks of `block` samples; its files are read once, for hashes and clock."""
-    return open_streams([settings], model, folder=folder, block=block)[0]
+    return open_streams([settings], model, folder=folder, block=block, missing=missing)[0]
 
 
 def open_streams(
-    settings: Sequence[RecordSettings], model: GeneratedModel | None = None, *, folder: str | Path | None = None, block: int = BLOCK
+    settings: Sequence[RecordSettings],
+    model: GeneratedModel | None = None,
+    *,
+    folder: str | Path | None = None,
+    block: int = BLOCK,
+    missing: bool = False,
 ) -> list[FileStream]:
     """Several records of one robot, to be read by blocks of `block` samples; as `read_records`."""
     settings, drives, joints = each_record(tuple(settings)), drives_of(model), names_of(model)
     streams = [
-        _stream(one, label, drives, joints, Path(folder or ""), block) for one, label in zip(settings, labels(settings), strict=True)
+        _stream(one, label, drives, joints, Path(folder or ""), block, missing)
+        for one, label in zip(settings, labels(settings), strict=True)
     ]
     for stream in streams:
         require_joints(stream.n, tuple(stream.files), model)
     return streams
 
 
-def _stream(settings: RecordSettings, label: Label, drives: Drives | None, joints: Sequence[str], folder: Path, block: int) -> FileStream:
+def _stream(
+    settings: RecordSettings, label: Label, drives: Drives | None, joints: Sequence[str], folder: Path, block: int, missing: bool
+) -> FileStream:
     if block < SHORTEST:
         raise InputError(f"blocks of {block} samples; expected at least {SHORTEST}")
     if settings.resample is not None:
         raise InputError("record.resample needs the whole record; set stream: off", file=", ".join(label.files))
-    opened = open_record(settings, label, drives, folder, joints=joints, by_blocks=True)
+    opened = open_record(settings, label, drives, folder, joints=joints, by_blocks=True, missing=missing)
     rate = settings.rate
     if opened.columns.t is not None:
         rate = clock(opened.stamps, lambda: opened.times(block))
     if rate is None:
         raise InputError("no time column and no rate; set record.rate (Hz) or record.columns.t", file=opened.first.file)
-    return FileStream(name=opened.name, n=opened.n, rate=rate, files=opened.hashes, samples=opened.samples, block=block, opened=opened)
+    name, n, files, follows = opened.name, opened.n, opened.hashes, opened.side.follows
+    return FileStream(name=name, n=n, rate=rate, files=files, samples=opened.samples, block=block, follows=follows, opened=opened)
 
 
 def records_or_streams(
-    settings: Sequence[RecordSettings], model: GeneratedModel, stream: Literal["auto", "off"] | int, *, folder: str | Path | None = None
+    settings: Sequence[RecordSettings],
+    model: GeneratedModel,
+    stream: Literal["auto", "off"] | int,
+    *,
+    folder: str | Path | None = None,
+    missing: bool = False,
 ) -> list[Record] | list[Stream]:
     """The records, all of them in memory, or all of them to be read by blocks, as the setting `stream` of a study says."""
     if stream == "off" or (stream == "auto" and not are_large(settings, folder)):
-        return read_records(settings, model, folder=folder)
-    streams: list[Stream] = [*open_streams(settings, model, folder=folder, block=BLOCK if stream == "auto" else stream)]
+        return read_records(settings, model, folder=folder, missing=missing)
+    streams: list[Stream] = [*open_streams(settings, model, folder=folder, block=BLOCK if stream == "auto" else stream, missing=missing)]
     return streams
 
 

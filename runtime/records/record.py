@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from runtime.errors import InputError
 from runtime.records.clock import JITTER, Stamps, rate_of, sample
+from runtime.records.missing import COUNTS, Missing, bridged
 from runtime.settings.record import SHORTEST
 
 Array = np.ndarray
@@ -55,6 +56,9 @@ class Record:
         What the time stamps were like and what was done about them, a sentence; "" where there were none.
     jitter : float
         Largest deviation of t from a uniform grid, sampling periods.
+    missing : array_like of bool, shape (N, n) or (N,), or Missing, optional
+        Samples of q that hold no position, where `signals.reader` is counts: np.isnan(q). There q becomes a straight line between its neighbours, for
+        what looks at positions as they are; the reader takes no notice of it.
 
     Raises
     ------
@@ -73,6 +77,7 @@ class Record:
     time: str
     jitter: float
     known: str
+    missing: Missing | None
     tau_known: Array | None = field(init=False)
 
     def __init__(
@@ -90,6 +95,7 @@ class Record:
         time: str = "",
         jitter: float = JITTER,
         known: str = "",
+        missing: ArrayLike | Missing | None = None,
     ) -> None:
         file = ", ".join(files or ()) or name
         given = {"t": np.array(t, dtype=float), "q": np.array(q, dtype=float), "tau": np.array(tau, dtype=float)}
@@ -110,13 +116,24 @@ class Record:
             require_finite(given["tau_known"], "tauknown", file)
             given["tau"] = given["tau"] - given["tau_known"]
             known = known or known_text(given["tau_known"])
+        missing = _missing(missing, given["q"].shape, file)
+        if missing is not None:
+            given["q"] = bridged(given["q"], missing.at_joints() & np.isnan(given["q"]))
         for label, x in given.items():
             require_finite(x, label.replace("_", ""), file)
             x.setflags(write=False)
         if rate is not None and not (np.isfinite(rate) and rate > 0):
             raise InputError(f"rate {rate} Hz; expected a positive number", file=file)
         rate = rate_of(Stamps(file, rate=rate, jitter=jitter), given["t"])
-        others = {"rate": rate, "name": name, "files": MappingProxyType(dict(files or {})), "time": time, "jitter": jitter, "known": known}
+        others = {
+            "rate": rate,
+            "name": name,
+            "files": MappingProxyType(dict(files or {})),
+            "time": time,
+            "jitter": jitter,
+            "known": known,
+            "missing": missing,
+        }
         others |= dict.fromkeys(("q_r", "tau_ff", "tau_known"))
         for label, value in (others | given).items():
             object.__setattr__(self, label, value)
@@ -136,8 +153,20 @@ class Record:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Records travel to other processes; a read-only mapping alone could not."""
-        others = {name: getattr(self, name) for name in ("rate", "name", "q_r", "tau_ff", "time", "jitter", "known")}
+        others = {name: getattr(self, name) for name in ("rate", "name", "q_r", "tau_ff", "time", "jitter", "known", "missing")}
         return partial(Record, files=dict(self.files), **others), (self.t, self.q, self.tau), {"tau_known": self.tau_known}
+
+
+def _missing(missing: ArrayLike | Missing | None, shape: tuple[int, ...], file: str) -> Missing | None:
+    """Missing samples of a record of positions of that shape; None where none is."""
+    if missing is None:
+        return None
+    if not isinstance(missing, Missing):
+        samples = np.array(missing)
+        missing = Missing(samples[:, None] if samples.ndim == 1 else samples)
+    if missing.samples.shape != shape or missing.samples.dtype != np.bool_:
+        raise InputError(f"missing {missing.samples.dtype} {missing.samples.shape}; expected bool {shape}, as q", file=file)
+    return missing if missing.samples.any() else None
 
 
 def known_text(known: Array) -> str:
@@ -152,7 +181,8 @@ def require_finite(x: Array, label: str, file: str) -> None:
         bad = np.argwhere(~np.isfinite(x))
         value, column = x[tuple(bad[0])], label if x.ndim == 1 else f"{label}{bad[0][1] + 1}"
         raise InputError(
-            f"{value} ({len(bad)} such values in all); expected finite numbers, repair or cut the record",
+            f"{value} ({len(bad)} such values in all); expected finite numbers, repair or cut the record"
+            f"{f'; {COUNTS} (here: missing=np.isnan(q))' if label == 'q' and np.isnan(value) else ''}",
             file=file,
             column=column,
             row=sample(int(bad[0][0])),

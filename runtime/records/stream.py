@@ -31,6 +31,8 @@ class Stream(ABC):
         N.
     block : int
         Samples of a block.
+    follows : ndarray of bool, shape (n, n), or None
+        Joint j follows from column i of the positions, as in `runtime.records.missing`.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Stream(ABC):
     files: Mapping[str, str]
     samples: int
     block: int
+    follows: Array | None = None
 
     def __len__(self) -> int:
         return self.samples
@@ -48,8 +51,8 @@ class Stream(ABC):
         """Time of the samples, s, by blocks."""
 
     @abstractmethod
-    def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
-        """t (B,), q (B, n), tau (B, n)."""
+    def blocks(self) -> Iterator[tuple[Array, Array, Array, Array]]:
+        """t (B,), q (B, n), tau (B, n), columns without a position, bool (B, n), or (B, 0) where none may be missing."""
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -59,16 +62,19 @@ class RecordStream(Stream):
     record: Record
 
     def __init__(self, record: Record, block: int) -> None:
-        super().__init__(name=record.name, n=record.n, rate=record.rate, files=record.files, samples=len(record), block=block)
+        follows = None if record.missing is None else record.missing.follows
+        name, n, rate, files = record.name, record.n, record.rate, record.files
+        super().__init__(name=name, n=n, rate=rate, files=files, samples=len(record), block=block, follows=follows)
         object.__setattr__(self, "record", record)
 
     def times(self) -> Iterator[Array]:
-        return (t for t, _, _ in self.blocks())
+        return (t for t, *_ in self.blocks())
 
-    def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
+    def blocks(self) -> Iterator[tuple[Array, Array, Array, Array]]:
+        missing = np.empty((len(self), 0), dtype=bool) if self.record.missing is None else self.record.missing.samples
         for a in range(0, len(self), self.block):
             samples = slice(a, a + self.block)
-            yield self.record.t[samples], self.record.q[samples], self.record.tau[samples]
+            yield self.record.t[samples], self.record.q[samples], self.record.tau[samples], missing[samples]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -87,8 +93,8 @@ class ChangedStream(Stream):
     def times(self) -> Iterator[Array]:
         return self.stream.times()
 
-    def blocks(self) -> Iterator[tuple[Array, Array, Array]]:
-        return ((t, *self.change(q, tau)) for t, q, tau in self.stream.blocks())
+    def blocks(self) -> Iterator[tuple[Array, Array, Array, Array]]:
+        return ((t, *self.change(q, tau), missing) for t, q, tau, missing in self.stream.blocks())
 
 
 class Queue:

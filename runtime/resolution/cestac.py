@@ -36,7 +36,7 @@ from runtime.records.record import Record
 from runtime.resolution.c.workspace import usable
 from runtime.resolution.checkpoint import Checkpoint
 from runtime.resolution.loop import Loop, LoopText, loop_of, without_loop_options
-from runtime.resolution.perturbed import Task, column_errors, perturbed, prepared_records, study_columns, with_deviation
+from runtime.resolution.perturbed import PreparedRecord, Task, column_errors, perturbed, prepared_records, study_columns, with_deviation
 from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.run import USABLE, forget, run_block
 from runtime.resolution.runs import Level, Runs
@@ -253,6 +253,12 @@ def _results(task: Task, blocks: Sequence[tuple[Key, ...]], workers: int, schedu
     return results(run_block, sent, blocks, workers, scheduler=scheduler)
 
 
+def _measured(record: PreparedRecord) -> Iterator[memoryview]:
+    """Positions, torques and missing samples of a record."""
+    missing = () if record.missing is None else (np.packbits(record.missing.samples),)
+    return (np.ascontiguousarray(x).data for x in (record.q, record.tau, *missing))
+
+
 def _identity(task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:
     """What decides every bit of every run: JSON values that tell studies apart, the number of runs aside."""
     drives = task.drives
@@ -266,6 +272,6 @@ def _identity(task: Task, described: Mapping[str, Any], provenance: Mapping[str,
         else [drives.ratio.tolist(), drives.offset.tolist(), drives.torque_constant.tolist(), drives.coupling],
         "robot": provenance.get("robot"),
         "robot_sha256": provenance.get("robot_sha256"),
-        "records": [sha256(np.ascontiguousarray(r.q).tobytes() + np.ascontiguousarray(r.tau).tobytes()).hexdigest() for r in task.records],
+        "records": [sha256(b"".join(map(bytes, _measured(r)))).hexdigest() for r in task.records],
         "versions": provenance["versions"],
     }

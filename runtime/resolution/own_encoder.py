@@ -69,7 +69,8 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
     own_drives = drives if settings.side == "motor" else None
     q = record.q if own_drives is None else own_drives.motor_position(record.q)
     known = signals.step is not None and signals.side == settings.side
-    given: Any = signals.step if known else [smallest_step(x) for x in q.T]
+    missing = np.zeros(q.shape, dtype=bool) if record.missing is None else record.missing.at_encoders(own_drives)
+    given: Any = signals.step if known else [smallest_step(x[~gaps]) for x, gaps in zip(q.T, missing.T, strict=True)]
     step = np.broadcast_to(np.asarray(given, dtype=float), (record.n,))
     finest, coarsest = min(settings.delta, default=np.inf), int(np.argmax(step))
     if finest <= 1.001 * step[coarsest]:
@@ -81,7 +82,7 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
     if finest >= (1 - 1e-9) * FINER * step[coarsest]:
         return OwnEncoder(step, None, None)
     try:
-        reading = read_counts(q, record.rate, step, name=record.name)
+        reading = read_counts(np.where(missing, np.nan, q), record.rate, step, name=record.name)
     except InputError as e:
         raise InputError(
             f"a step of {finest:.4g} is less than {FINER:g} steps of encoder {coarsest + 1} ({step[coarsest]:.4g}), so positions would be drawn from "

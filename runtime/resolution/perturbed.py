@@ -24,6 +24,7 @@ from runtime.observation.filters import States, filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, stack
 from runtime.observation.rows import Selection, select_rows
 from runtime.observation.states import observed_states
+from runtime.records.missing import COUNTS, Missing, require_positions
 from runtime.records.record import Record
 from runtime.resolution.loop import Loop, LoopText
 from runtime.resolution.own_encoder import OwnEncoder, own_encoder
@@ -53,6 +54,8 @@ class PreparedRecord:
         Of the record as measured, where it can be read as counts; None: by the low-pass.
     own : OwnEncoder or None
         The encoder that made it, under law phase.
+    missing : Missing or None
+        Samples without a position, in every run the same.
     note : str
         Why the record as measured is not read as counts, where the study asks for counts.
     """
@@ -65,6 +68,7 @@ class PreparedRecord:
     torque: Array
     states: States | None = None
     own: OwnEncoder | None = None
+    missing: Missing | None = None
     note: str = ""
 
 
@@ -117,18 +121,20 @@ def prepared(
     """
     signals = replace(study.signals, median=study.cestac.median)
     own, counts, note = own_encoder(record, study, drives), None, ""
-    if signals.reader == "counts" and (signals.step is not None or (own is not None and own.reading is not None)):
+    if signals.reader == "counts" and (signals.step is not None or record.missing or (own is not None and own.reading is not None)):
         known = signals if signals.step is not None or own is None else replace(signals, step=tuple(own.step), side=study.cestac.side)
-        counts = observed_states(model, record.q, record.rate, known, drives=drives, name=record.name)
+        counts = observed_states(model, record.q, record.rate, known, drives=drives, missing=record.missing, name=record.name)
     elif signals.reader == "counts":
         note = f"Beside these steps the positions of {record.name} count as exact: the estimate that runs are compared with reads them by the low-pass."
+    if counts is None:
+        require_positions(record.missing, "reader: lowpass", record.file, COUNTS)
     if part is None:
         states = counts or filtered_states(record.q, record.rate, signals)
         selection = select_rows(record, states.qd, signals, study.rows)
         torque = decimated_torque(record.tau, selection)
     else:
         selection, torque = part.selection, part.torque
-    return PreparedRecord(record.q, record.tau, record.rate, dict(record.files), selection, torque, counts, own, note)
+    return PreparedRecord(record.q, record.tau, record.rate, dict(record.files), selection, torque, counts, own, record.missing, note)
 
 
 def prepared_records(
@@ -225,7 +231,7 @@ def run_states(model: GeneratedModel, task: Task, record: PreparedRecord, q: Arr
         return record.states or filtered_states(q, record.rate, signals)
     known = replace(signals, step=level.delta, side=task.settings.side)
     try:
-        return observed_states(model, q, record.rate, known, drives=task.drives)
+        return observed_states(model, q, record.rate, known, drives=task.drives, missing=record.missing)
     except np.linalg.LinAlgError as e:
         raise InputError(f"counts of steps of {level.label} cannot be read on this motion ({e}); use finer steps") from e
 

@@ -30,6 +30,7 @@ from runtime.observation.counts import read_counts
 from runtime.observation.filters import SpeedErrors, States, filtered_states
 from runtime.observation.observation import Observation, Selection, observation_from_states, stack
 from runtime.observation.states import certain_rows, encoder_root, joint_states
+from runtime.records.missing import require_positions
 from runtime.records.record import Record
 from runtime.resolution.advice import (
     AGREED,
@@ -106,6 +107,7 @@ class RealEncoders:
         side = drives if study.cestac.side == "motor" else None
         self.parts = []
         for record in records:
+            require_positions(record.missing, "advice on encoders", record.file)
             part = prepared(model, record, self.study, drives)
             x = record.q if side is None else side.motor_position(record.q)
             states = part.states or filtered_states(record.q, record.rate, part.selection.signals)

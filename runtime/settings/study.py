@@ -131,6 +131,11 @@ class Signals(Settings):
         for key, given in (("step", self.step is not None), ("side", self.side != "joint"), ("lines", self.lines != "detected")):
             require(self.reader == "counts" or not given, "given, but reader is lowpass; it is a setting of reader: counts", key)
 
+    @property
+    def admits_missing(self) -> bool:
+        """Whether positions of a record may be missing: the reader of counts fills them."""
+        return self.reader == "counts"
+
 
 class Rows(Settings):
     """Rows of W and Y that are used.

@@ -79,7 +79,7 @@ def cestac(
         if study.cestac.place == "record":
             session.require_record(study, record[0])
         study = session.changed(session.changed(study, "estimate", method=method), "signals", reader=reader)
-        records = read_records(study.record, model)
+        records = read_records(study.record, model, missing=study.signals.admits_missing)
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice
         try:

@@ -47,7 +47,7 @@ def excite(
         model = session.model_of(robot)
         study = Study() if record is None else session.study_of_arguments([record], recorded=False)
         study = session.changed(study, "excitation", **given)
-        records = read_records(study.record, model)
+        records = read_records(study.record, model, missing=study.signals.admits_missing)
         with session.progress_bar("starts") as progress:
             result = runtime.excite(model, records, study, workers=workers, progress=progress)
         if results is not None:

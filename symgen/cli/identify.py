@@ -57,7 +57,7 @@ def identify(
         model = model_of(robot, target)
         study = study_of_arguments(record)
         study = study if block is None else replace(study, stream=block)
-        records = records_or_streams(study.record, model, study.stream)
+        records = records_or_streams(study.record, model, study.stream, missing=study.signals.admits_missing)
         computed = {"target": target_of(model), "processor": processor()}
         result = runtime.identify(
             model,

@@ -41,7 +41,7 @@ def report(
         model = session.model_of(robot)
         study = session.changed(session.study_of_arguments(record), "cestac", side=side)
         steps = () if encoder is None else session.changed(study, "cestac", delta=encoder).cestac.delta
-        records = records_or_streams(study.record, model, study.stream)
+        records = records_or_streams(study.record, model, study.stream, missing=study.signals.admits_missing)
         runs = partial(session.model_of_runs, model, robot)
         result = assess(model, records, study, encoder=steps, variants=session.variants_of(robot), runs=runs, progress=session.say)
         runtime.report(result, results)

@@ -90,7 +90,7 @@ def read_record(path: Path) -> object:
     if format_of(path).by_blocks and path.suffix != ".gz":
         try:
             stream = open_stream(settings, folder=path.parent, block=10)
-            blocks = [q for _, q, _ in stream.blocks()]
+            blocks = [q for _, q, _, _ in stream.blocks()]
         except InputError:
             if refused is None:
                 raise

@@ -193,6 +193,33 @@ def test_counts_that_wrap_are_unwrapped_and_told():
     np.testing.assert_allclose(moved_by, moved_by[0], atol=1e-4)
 
 
+@pytest.mark.parametrize("bits", [16, 32])
+def test_wraps_by_blocks_as_a_whole(planar, record, monkeypatch, bits):
+    """Counts that wrap within a stretch, within its margins and while samples are missing: the numbers of the whole record, and its sentences."""
+    monkeypatch.setattr("runtime.observation.counts.STRETCH", 1500)
+    monkeypatch.setattr("runtime.observation.counts.MARGIN", 400)
+    fine, half = 2e-5, slice(4000)
+    wrapped = fine * (np.round(motion(record.t[half])[0] / fine) % 2**bits)
+    missing = np.zeros(wrapped.shape, dtype=bool)
+    at = np.flatnonzero(np.abs(np.diff(wrapped[:, 0])) > 0.1)
+    missing[at[0] - 3 : at[0] + 4, 0] = True
+    study = replace(STUDY, signals=replace(STUDY.signals, step=fine))
+    changed = Record(record.t[half], wrapped, record.tau[half], rate=1000.0, missing=missing)
+    whole, blocks = observe(planar, changed, study), observe(planar, RecordStream(changed, 700), study)
+    said = [[text for text in own.findings if "wraps" in text or "missing" in text] for own in (whole, blocks)]
+    assert whole.rows == blocks.rows and said[0] == said[1]
+    assert sum(f"the count wraps at 2^{bits} " in text for text in said[0]) == 2, whole.findings
+    np.testing.assert_allclose(blocks.W, whole.W, atol=1e-6 * np.abs(whole.W).max())
+    reset = wrapped.copy()
+    reset[3000:, 1] -= 1234567 * fine
+    refused = []
+    for source in (replace(changed, q=reset), RecordStream(replace(changed, q=reset), 700)):
+        with pytest.raises(InputError, match=r"encoder 2: the count jumps by -123\d+ at sample 3000; it was reset or lost there") as told:
+            observe(planar, source, study)
+        refused.append(str(told.value))
+    assert refused[0] == refused[1]
+
+
 def test_an_encoder_at_rest_is_told():
     q, _, _ = moved()
     position = counted(q, 0.01)
@@ -255,7 +282,8 @@ def test_by_blocks_as_a_whole(planar, record, monkeypatch):
 def test_identify_prints_what_the_reader_says_of_the_encoders(planar, record):
     noise = 0.02 * np.random.default_rng(0).standard_normal(record.tau[:4000].shape)
     half = Record(record.t[:4000], record.q[:4000], record.tau[:4000] + noise, rate=1000.0)
-    result = runtime.identify(planar, half, replace(STUDY, signals=replace(STUDY.signals, step=2.5e-3)))
+    result = runtime.identify(planar, half, replace(STUDY, signals=replace(STUDY.signals, step=2.5e-3)), friction=True)
+    assert tuple(len(curve.v) for curve in result.friction) == tuple(joint.rows for joint in result.estimate.per_joint)
     assert "record: encoder 2: counts change by multiples of 2; the step of the record is 0.005, not 0.0025." in result.to_text()
 
 

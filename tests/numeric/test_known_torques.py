@@ -41,7 +41,7 @@ def test_known_torques_are_found_subtracted_and_said(tmp_path, place):
     np.testing.assert_array_equal(record.tau, LEFT)
     np.testing.assert_array_equal(record.tau_known[:, 1], BALANCE)
     assert record.known == f"known torques subtracted: up to {BALANCE.max():.4g} of joint 2 (N m or N)"
-    blocks = [tau for _, _, tau in open_stream(given, folder=tmp_path, block=16).blocks()]
+    blocks = [tau for _, _, tau, _ in open_stream(given, folder=tmp_path, block=16).blocks()]
     np.testing.assert_array_equal(np.vstack(blocks), LEFT)
 
 

@@ -361,7 +361,7 @@ def test_decimal_commas(tmp_path, delimiter, header):
     whole, stream = read_record(given, folder=tmp_path), open_stream(given, folder=tmp_path, block=25)
     np.testing.assert_array_equal(whole.q, Q)
     np.testing.assert_array_equal(whole.tau, TAU)
-    np.testing.assert_array_equal(np.concatenate([q for _, q, _ in stream.blocks()]), Q)
+    np.testing.assert_array_equal(np.concatenate([q for _, q, _, _ in stream.blocks()]), Q)
 
 
 NAMES = "t;q1;q2;tau1;tau2\n"

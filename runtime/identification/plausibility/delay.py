@@ -147,6 +147,8 @@ class _Problem:
         t0, t1 = study.rows.window
         inside = (record.t >= (-np.inf if t0 is None else t0)) & (record.t <= (np.inf if t1 is None else t1))
         inside[:margin] = inside[-margin:] = False
+        if record.missing is not None:
+            inside &= ~record.missing.near_gaps(margin // 10, margin)
         kept = np.flatnonzero(inside)
         step = max(1, int(0.8 * record.rate / (2 * cutoff)), -(-len(kept) // INSTANTS))
         kept = kept[::step]

@@ -13,6 +13,7 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.observation.filters import Lowpass, filtered_states, lowpass_filtered, median_filtered
+from runtime.records.missing import Missing
 from runtime.records.record import Record
 from runtime.records.stream import Stream
 from runtime.settings.study import Study
@@ -101,7 +102,11 @@ def excerpts(stream: Stream, study: Study) -> list[Record]:
             if len(own):
                 part.append(tuple(x[own] for x in block))
         first += len(block[0])
-    return [Record(*(np.concatenate(x) for x in zip(*part, strict=True)), name=stream.name) for part in parts if part]
+    return [_excerpt(stream, *(np.concatenate(x) for x in zip(*part, strict=True))) for part in parts if part]
+
+
+def _excerpt(stream: Stream, t: Array, q: Array, tau: Array, missing: Array) -> Record:
+    return Record(t, q, tau, name=stream.name, missing=Missing(missing, stream.follows) if missing.any() else None)
 
 
 def samples_of(records: Sequence[Record], study: Study, most: int = MOST) -> Samples:
@@ -144,6 +149,8 @@ def _filtered(record: Record, study: Study, number: int) -> Samples:
     step = max(1, int(0.8 * record.rate / (2 * cutoff)))
     t0, t1 = study.rows.window
     inside = (record.t >= (-np.inf if t0 is None else t0)) & (record.t <= (np.inf if t1 is None else t1))
+    if record.missing is not None:
+        inside &= ~record.missing.near_gaps(step, 3 * step)
     kept = np.flatnonzero(inside)[3 * step : -3 * step : step]
     if len(kept) < 2:
         raise InputError("no sample in the window", file=record.name)

@@ -86,6 +86,10 @@ class Table(ABC):
         Of a bag.
     digest : str
         SHA-256 of the uncompressed bytes.
+    positions : frozenset of str
+        Columns of positions.
+    missing : bool
+        Whether these may be missing: nan, in a text file an empty field.
     """
 
     what: ClassVar[str] = "such a file"
@@ -96,6 +100,8 @@ class Table(ABC):
     joints: tuple[str, ...] | None = None
     topic: str = ""
     digest: str = field(default="", init=False)
+    positions: frozenset[str] = field(default=frozenset(), init=False)
+    missing: bool = field(default=False, init=False)
 
     @abstractmethod
     def samples(self, groups: Groups) -> int:

@@ -17,6 +17,7 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.files import opened
 from runtime.records.formats.columns import WIDEST, Array, Groups, Source, Table
+from runtime.records.missing import COUNTS
 from runtime.records.stream import Queue
 
 LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits each
@@ -70,7 +71,10 @@ class TextTable(Table):
             try:
                 yield list(np.loadtxt(plain, delimiter=self.delimiter, usecols=indices, ndmin=2, comments=None, quotechar='"').T)
             except ValueError:
-                raise self._not_a_number(indices, numbers, plain) from None
+                if error := self._not_a_number(indices, numbers, plain):
+                    raise error from None
+                plain = [_with_nan(text, self.delimiter) for text in plain]
+                yield list(np.loadtxt(plain, delimiter=self.delimiter, usecols=indices, ndmin=2, comments=None, quotechar='"').T)
 
     def _pieces(self) -> Iterator[str]:
         """What stands under the header, in pieces of whole lines; ValueError where a line is no line of numbers with decimal points."""
@@ -91,6 +95,17 @@ class TextTable(Table):
 
     def _loaded(self, lines: str) -> Array:
         """Numbers, shape (B, len(names)); ValueError where there is anything else."""
+        try:
+            numbers = self._plain(lines)
+        except ValueError:
+            if not self.missing:
+                raise
+            numbers = self._plain(_with_nan(lines, self.delimiter))
+            if np.isnan(numbers[:, [name not in self.positions for name in self.names]]).any():
+                raise
+        return numbers
+
+    def _plain(self, lines: str) -> Array:
         quote = '"' if '"' in lines else None
         numbers = np.loadtxt(StringIO(lines), delimiter=self.delimiter, ndmin=2, comments=None, quotechar=quote)
         if numbers.shape[1] != len(self.names):
@@ -139,17 +154,21 @@ class TextTable(Table):
                 f"{width} fields; expected {len(self.names)} ({', '.join(self.names)}); {hint}", file=self.file, row=f"line {k}"
             )
 
-    def _not_a_number(self, indices: list[int], numbers: Sequence[int], lines: Sequence[str]) -> InputError:
+    def _not_a_number(self, indices: list[int], numbers: Sequence[int], lines: Sequence[str]) -> InputError | None:
+        """What is wrong with the first field that is not a number; None where all of them are empty ones of positions, which may be missing."""
         for k, line in zip(numbers, lines, strict=True):
             fields = _fields(line, self.delimiter)
             for i in indices:
-                if not _is_number(fields[i]):
+                position = not fields[i] and self.names[i] in self.positions
+                if not _is_number(fields[i]) and not (position and self.missing):
                     what = "an empty field" if not fields[i] else repr(fields[i])
                     hint = "; put # before a second line of names or units" if k == next(self._lines())[0] and fields[i] else ""
+                    if position:
+                        hint = f", or repair or cut the record; {COUNTS}"
                     if "," in fields[i]:
                         hint = "; write decimals with a point, or set record.decimal: ','"
                     return InputError(f"{what}; expected a number{hint}", file=self.file, column=self.names[i], row=f"line {k}")
-        return InputError("a field that is not a number", file=self.file)
+        return None if self.missing else InputError("a field that is not a number", file=self.file)
 
 
 def open_text(source: Source) -> TextTable:
@@ -205,6 +224,14 @@ def _regular(lines: bytes) -> str:
 def _one_newline(text: str) -> str:
     """The text with "\\n" at the end of every line."""
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
+def _with_nan(text: str, delimiter: str | None) -> str:
+    """The lines with nan in empty fields, quoted ones too; blanks between numbers leave none empty."""
+    if delimiter is None:
+        return text
+    d, nothing = re.escape(delimiter), r' *(?:"")? *'
+    return re.sub(rf"(?m)(?:^|(?<={d})){nothing}(?={d})|(?<={d}){nothing}$", "nan", text)
 
 
 def _fields(line: str, delimiter: str | None) -> list[str]:
