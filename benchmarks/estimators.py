@@ -350,7 +350,7 @@ Error against the truth of the records above (one phase), the same of the runs o
 
 Errors against the truth agree within what five records of some per cent scatter allow, on the TX40 at every step but for TLS at the coarsest one (42, with 6 % of scatter
 among the 66 records). They differ on the EMPS at 0.1 mm, where 5.6, 6.5 and 5.1 % of TLS, IV and DIDIM stand beside 2.1, 3.4 and 2.5: the records above all have the same
-phase, the runs of the verb have not, and there the phase decides as much as the step.
+phase, the runs of the verb do not. There FS1 by DIDIM is off by 0.1 to 11 % from phase to phase; TLS and IV are off alike in all five phases tried.
 
 **Which of the two to read.** %e is what steps do: noise, disturbance and a bias that is there with an exact encoder too (OLS and IV of the EMPS, 1.1 %) are in the estimate it compares
 with, so it falls to zero with the step, to 0.02 % at 1 um. It is the only one where the truth is not known, and it answers how fine an encoder must be. The error
