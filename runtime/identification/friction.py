@@ -183,6 +183,10 @@ def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, n
     window = states[selection.samples]
     X = np.array([fit[name] if name in fit.names else 0.0 for name in model.BASE_PARAMETERS])
     block = observation.blocks()
+    own = [own_friction(model, j) for j in range(observation.n)]
+    frictionless = X.copy()
+    frictionless[[k for columns in own for k in columns]] = 0.0  # each acts on its own joint alone
+    transmitted = np.abs(cast(Any, model).inverse_dynamics(window.q, window.qd, window.qdd, frictionless))
 
     def at_rows(signal: Array, j: int) -> Array:
         return decimated(signal, selection.factor, selection.signals.decimate)[..., selection.mask[j]]
@@ -190,9 +194,8 @@ def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, n
     terms = []
     for j in range(observation.n):
         rest = X.copy()
-        rest[own_friction(model, j)] = 0.0
+        rest[own[j]] = 0.0
         rows, v = observation.joint(j), window.qd[:, j]
-        transmitted = np.abs(cast(Any, model).inverse_dynamics(window.q, window.qd, window.qdd, rest)[:, j])
         s = np.sign(v)
         signals = {
             "FS": s,
@@ -202,7 +205,7 @@ def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, n
             "FVP": np.maximum(v, 0),
             "FSN": (v < 0) * -1.0,
             "FVN": np.minimum(v, 0),
-            "FL": s * transmitted,
+            "FL": s * transmitted[:, j],
         }
 
         def excess(VS: float, v: Array = v, j: int = j) -> Array:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -18,7 +19,7 @@ from runtime.observation.system import split_rows
 
 Array = np.ndarray
 
-SLOWEST, FASTEST = 0.005, 0.5  # of the largest speed: where VS is searched
+SLOWEST, FASTEST, GRID = 0.005, 0.5, 16  # of the largest speed: where VS is searched, and at how many values first
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,12 @@ class Terms:
     linear: Mapping[str, Array]
     excess: Callable[[float], Array]
 
+    @cached_property
+    def grid(self) -> tuple[Array, Array]:
+        """Logarithms of the VS among which a search begins, shape (k,), and the term of FST for each, shape (k, N)."""
+        x = np.log(np.abs(self.v).max() * np.geomspace(SLOWEST, FASTEST, GRID))
+        return x, np.array([self.excess(float(np.exp(one))) for one in x])
+
 
 LAWS: Mapping[str, tuple[str, ...]] = {
     "coulomb+viscous": ("FS", "FV", "OFFSET"),
@@ -70,21 +77,31 @@ def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
 
 def fitted(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
     """Least squares of a law on some rows; VS by a search on a logarithmic axis."""
-    linear = [name for name in names if name != "VS"]
+    f, VS = terms.f[rows], _excess_velocity(terms, names, rows) if "VS" in names else None
+    x = np.linalg.lstsq(_columns(terms, names, VS)[rows], f, rcond=None)[0]
+    law = dict(zip((name for name in names if name != "VS"), map(float, x), strict=True))
+    return law if VS is None else {**law, "VS": VS}
 
-    def solved(VS: float | None) -> tuple[Array, float]:
-        A, f = _columns(terms, names, VS)[rows], terms.f[rows]
-        x = np.linalg.lstsq(A, f, rcond=None)[0]
-        return x, float(np.sum((f - A @ x) ** 2))
 
-    if "VS" not in names:
-        return dict(zip(linear, map(float, solved(None)[0]), strict=True))
-    grid = np.log(np.abs(terms.v).max() * np.geomspace(SLOWEST, FASTEST, 16))
-    best = grid[np.argmin([solved(float(np.exp(x)))[1] for x in grid])]
-    step = grid[1] - grid[0]
+def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
+    """VS of the least squares of a law: the term of FST, made orthogonal to the others, takes (e'r)^2 / e'e from the squares of their residual r."""
+    others = _columns(terms, [name for name in names if name not in ("FST", "VS")], None)[rows]
+    U, s, _ = np.linalg.svd(others, full_matrices=False)
+    Q = U[:, s > s[0] * max(others.shape) * np.finfo(float).eps]
+    r = terms.f[rows] - Q @ (Q.T @ terms.f[rows])
+
+    def left(excess: Array) -> Array:
+        """Squares of the residual, less those of r; excess, shape (..., N)."""
+        e = excess[..., rows]
+        e = e - (e @ Q) @ Q.T
+        length = np.sum(e**2, axis=-1)
+        return -np.divide((e @ r) ** 2, length, out=np.zeros_like(length), where=length > 0)
+
+    grid, excesses = terms.grid
+    best, step = grid[np.argmin(left(excesses))], grid[1] - grid[0]
     ends = (max(best - step, grid[0]), min(best + step, grid[-1]))
-    VS = float(np.exp(minimize_scalar(lambda x: solved(float(np.exp(x)))[1], bounds=ends, method="bounded", options={"xatol": 1e-3}).x))
-    return {**dict(zip(linear, map(float, solved(VS)[0]), strict=True)), "VS": VS}
+    found = minimize_scalar(lambda x: float(left(terms.excess(float(np.exp(x))))), bounds=ends, method="bounded", options={"xatol": 1e-3})
+    return float(np.exp(found.x))
 
 
 def law_torque(terms: Terms, law: Mapping[str, float]) -> Array:
