@@ -95,7 +95,8 @@ def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
         e = excess[..., rows]
         e = e - (e @ Q) @ Q.T
         length = np.sum(e**2, axis=-1)
-        return -np.divide((e @ r) ** 2, length, out=np.zeros_like(length), where=length > 0)
+        taken: Array = np.divide((e @ r) ** 2, length, out=np.zeros_like(length), where=length > 0)
+        return -taken
 
     grid, excesses = terms.grid
     best, step = grid[np.argmin(left(excesses))], grid[1] - grid[0]
