@@ -1,10 +1,10 @@
-"""Positions read as counts, beside positions as they are: the measured TX40 at coarser steps, other rates, uneven lines; the encoder in the loop.
+"""Positions read as counts, beside positions as they are: the measured TX40 at coarser steps, other rates, uneven lines; a haptic device.
 
-    python benchmarks/counts.py [steps rates lines loop time ...] [--seeds 20] [-o docs]
+    python benchmarks/counts.py [steps rates lines time haptic] [--seeds 20]
 
 Positions of the record are rounded to steps of 2 pi/5000 ... 2 pi/100 at a random phase of every joint and seed, torques stay as recorded. Errors are
 those of the main parameters against the estimate from the record itself. Estimates are kept in counts_runs.jsonl as they come; the same command
-goes on from there. Written: counts.md. The record comes from `symgen datasets`.
+goes on from there. The record comes from `symgen datasets`. `haptic`: change of its essential parameters by CESTAC of law phase, encoders at the motors.
 """
 
 # ruff: noqa: E402
@@ -25,6 +25,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 
+import symgen
 from runtime import load_model
 from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import estimate_of
@@ -36,19 +37,21 @@ from runtime.observation.states import certain_rows, observed_states
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
+from runtime.resolution.cestac import cestac
+from runtime.resolution.readers import READERS
 from runtime.settings.study import Study, study_from_mapping
 from runtime.table import aligned
+from symgen.demo.counts import MAIN
+from symgen.demo.haptic_motion import haptic_record, haptic_study
+from symgen.demo.simulated_record import read_simulated
 
 Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
-MAIN = [
-    *("ZZ1R", "FV1", "FS1", "XX2R", "ZZ2R", "MX2R", "FV2", "FS2", "MY3R", "Ia3"),
-    *("FV3", "FS3", "Ia4", "FV4", "FS4", "Ia5", "FV5", "FS5", "FV6"),
-]
 STEPS = (5000, 2000, 1000, 500, 250, 100)  # counts per turn of the joint
 RATES = (5000, 1000, 500, 250)
 LINE_MODES: Mapping[str, Literal["detected", "estimated"]] = {"counts": "detected", "estimated": "estimated"}
 PROTOTYPE = {5000: 1.4, 2000: 1.7, 1000: 3.3, 500: 4.7, 250: 7.3, 100: 9.3}  # rms %, mean of three phases, of the design note
+HAPTIC_STEPS = (0.03, 0.06, 0.12, 0.25, 0.5)  # rad at the motors
 LINES = {"quadrature 0.1": (0.1, "quadrature"), "random 0.1": (0.1, "random"), "random 0.03": (0.03, "random")}
 
 
@@ -206,17 +209,37 @@ def times() -> str:
     return aligned(lines)
 
 
+def haptic(runs: int) -> str:
+    """%e (21) of the essential parameters of the haptic device, rms and largest, by both readers."""
+    model = symgen.model("haptic")
+    record = read_simulated(model, haptic_study(runs), haptic_record(model), "").record
+    lines: list[Sequence[str]] = [("step, rad", "positions: rms %", "largest", "counts: rms %", "largest")]
+    found = []
+    study = haptic_study(runs)
+    names = essential_of(observe(model, record, study), study.essential, study.estimate).names
+    study = replace(study, cestac=replace(study.cestac, rounding="phase", delta=HAPTIC_STEPS))
+    for reader in READERS:
+        found.append(cestac(model, record, replace(study, signals=replace(study.signals, reader=reader)), columns=names))
+    for levels in zip(*(f.levels for f in found), strict=True):
+        lines.append(
+            (f"{levels[0].level.delta:g}", *(f"{x:.2f}" for level in levels for x in (np.sqrt(np.mean(level.e**2)), level.e.max())))
+        )
+    return aligned(lines)
+
+
 def main() -> None:
     """Compute what is missing, write the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", default=["steps", "rates", "lines", "time"])
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     given = parser.parse_args()
     file = Path("counts_runs.jsonl")
     for part in given.parts:
         if part == "time":
             print(times())
+            continue
+        if part == "haptic":
+            print(haptic(given.seeds))
             continue
         rows = computed(file, list(wanted(part, given.seeds)), run)
         text = table(rows, {"steps": ("per_turn",), "rates": ("rate", "per_turn"), "lines": ("lines",)}[part])

@@ -42,8 +42,8 @@ LINES = 0.01
 """Error of a line that is always allowed for, steps."""
 WINDOW, OF_RECORD = 0.05, 3.0
 """Length of time that has a jerk density of its own, s, and the weight of the whole record in it, in determined jerks."""
-RANGE, CONDITION = 1e-3, 1e-9
-"""Least share of a window's density in that of the record; least density that a Cholesky factor resolves, by h^5."""
+RANGE = 1e-3
+"""Least share of a window's density in that of the record."""
 GAP = 10.0
 """Deviation of a missing sample, ranges of the counts: as good as none, but the precision of a long gap remains one that Cholesky factors."""
 SPACING = 0.3
@@ -218,5 +218,5 @@ def _density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
     whole = squares.mean(axis=1, keepdims=True) / determined.mean(axis=1, keepdims=True)
     size = max(1, round(WINDOW / basis.h))
     squares, determined = (size * uniform_filter1d(x, size, axis=1, mode="nearest") for x in (squares, determined))
-    least = np.maximum(RANGE * whole, CONDITION / (basis.h**5 * basis.m))
+    least = np.maximum(RANGE * whole, basis.least_density)
     return np.asarray(np.maximum((squares + OF_RECORD * whole) / (determined + OF_RECORD), least))

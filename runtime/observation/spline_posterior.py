@@ -25,6 +25,8 @@ PAIRS = [(a, b) for a in range(4) for b in range(a, 4)]
 JERK = np.array([-1.0, 3.0, -3.0, 1.0])
 SLOPE = 1e-3
 """Difference of log r by which log |A| is differentiated."""
+CONDITION = 1e-9
+"""Least density that a Cholesky factor resolves, by h^5."""
 
 
 class Basis:
@@ -45,6 +47,11 @@ class Basis:
             np.stack([1 - u, 3 * u - 2, 1 - 3 * u, u], axis=1) / self.h**2,
         )
         self.products = np.stack([self.values[0][:, a] * self.values[0][:, b] for a, b in PAIRS], axis=1)
+
+    @property
+    def least_density(self) -> float:
+        """Least density of the jerk that a Cholesky factor of A resolves, steps^2/s^5; sites have a precision of 0.06 and more."""
+        return CONDITION / (self.h**5 * self.m)
 
     def at_samples(self, c: Array, order: int = 0) -> Array:
         """The spline, or its derivative of that order, shape (n, m M), of coefficients (n, P)."""
@@ -169,12 +176,13 @@ def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: Array) 
     """MacKay's rule for one density r of the jerk by channel, shape (n,): squares of the jerk over the number of jerks that sites determine.
 
     samples, unit : shares of A that sites have, and the prior of density one.   g : slope at c = 0.   The number is M less the trace of
-    A^-1 unit/r, which is the slope of log |A| by log 1/r: two factors and no inverse.
+    A^-1 unit/r, which is the slope of log |A| by log 1/r: two factors and no inverse. Never below basis.least_density: where counts tell no jerk, the
+    rule has no other fixed point than zero.
     """
     factor, beside = (Factor.of(samples + unit / x[:, None]) for x in (r, r * np.exp(SLOPE)))
     determined = basis.M - (factor.log_determinants - beside.log_determinants) / SLOPE
     squares = (basis.jerk(factor.solve(g)) ** 2).sum(axis=1) * basis.h
-    return np.asarray(squares / np.maximum(determined, 1e-9 * basis.M))
+    return np.asarray(np.maximum(squares / np.maximum(determined, 1e-9 * basis.M), basis.least_density))
 
 
 def _joined(first: Array, through: Array) -> Array:

@@ -19,7 +19,7 @@ from runtime.observation.encoder_lattice import lattice
 from runtime.observation.filters import filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states, observe
 from runtime.observation.rows import select_rows
-from runtime.observation.spline_posterior import Basis, Factor
+from runtime.observation.spline_posterior import Basis, Factor, next_density
 from runtime.observation.states import UNCERTAIN, certain_rows, observed_states
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
@@ -352,3 +352,15 @@ def test_measured_record_at_a_coarse_step(tx40_data):
         for X in (fitted(read, certain_rows(model, read).T), fitted(filtered_states(q, full.rate, study.signals)))
     )
     assert by_counts < 0.02 and by_positions > 0.2
+
+
+def test_a_motion_without_jerk_has_a_density_that_factors():
+    """Constant speed, ten seconds a count: MacKay's rule has no fixed point but zero, and its passes would overflow."""
+    y = np.round(0.1 * np.arange(20_000) / 1000.0)[None]
+    basis = Basis(20_000, 1, 2, 1e-3)
+    samples, ones = basis.of_samples(np.full(y.shape, 0.06)), np.ones((1, basis.M))
+    g, r = basis.gradient(0.06 * y, ones, np.zeros((1, basis.P))), np.array([1e8])
+    for _ in range(30):
+        r = next_density(basis, samples, basis.of_prior(ones), g, r)
+    assert r == basis.least_density
+    assert np.isfinite(Factor.of(basis.precision(np.full(y.shape, 0.06), r[:, None] * ones)).solve(g)).all()
