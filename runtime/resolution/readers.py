@@ -308,9 +308,9 @@ def curves(
             for at, count in vague.items():
                 known[label][at] = real.change(real.nodes(start * RATIO**at, moving, count), moving)
             sharp[label].update(vague)
-            last = max(known[label])
-            if last in vague and np.abs(known[label][last][0, decisive]).max() < LIMITS[-1]:
-                evaluate(last + 1)
+            onward = max(known[label]) in vague  # the walk ended where the change is now below the last limit
+            while onward and np.abs(known[label][(last := max(known[label]))][0, decisive]).max() < LIMITS[-1]:
+                onward = label in evaluate(last + 1)
     order = {label: sorted(own) for label, own in known.items()}
     b = len(real.names)
     return {
