@@ -16,10 +16,11 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from importlib.metadata import version
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
 from runtime.errors import InputError
@@ -86,14 +87,37 @@ def results(
                 yield result
             died += 1
             if lost and died == PATIENCE:
-                dead, advice = ("processes", "use fewer workers") if scheduler is None else (f"workers of {scheduler}", "see their logs")
+                dead, advice = (
+                    ("processes", 'use fewer workers; a script needs `if __name__ == "__main__":`')
+                    if scheduler is None
+                    else (f"workers of {scheduler}", "see their logs")
+                )
                 raise InputError(f"{dead} died {PATIENCE} times before any of {len(lost)} tasks was done (no memory left?); {advice}")
             missing = lost
 
 
+def in_order(task: Callable[[C, K], R], context: C, keys: Iterable[K], workers: int) -> Iterator[R]:
+    """task(context, key) in the order of the keys, by so many processes; results that come early wait."""
+    waiting: dict[int, R] = {}
+    following = 0
+    for number, result in results(_numbered, (task, context), enumerate(keys), workers):
+        waiting[number] = result
+        while following in waiting:
+            yield waiting.pop(following)
+            following += 1
+
+
+def _numbered(context: tuple[Callable[[C, K], R], C], key: tuple[int, K]) -> tuple[int, R]:
+    task, own = context
+    return key[0], task(own, key[1])
+
+
 def _pooled(task: Callable[[C, K], R], context: C, keys: list[K], workers: int, lost: list[K]) -> Iterator[R]:
     """Results of one pool of processes; keys whose process died go to `lost`."""
-    pool = ProcessPoolExecutor(min(workers, len(keys)), mp_context=get_context("spawn"), initializer=_start, initargs=(task, context))
+    spawn = get_context("spawn")
+    watched, held = spawn.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(min(workers, len(keys)), mp_context=spawn, initializer=_start, initargs=(task, context, watched))
+    stopped = True
     try:
         futures: dict[Future[R], K] = {}
         for key in keys:
@@ -107,21 +131,26 @@ def _pooled(task: Callable[[C, K], R], context: C, keys: list[K], workers: int, 
                 lost.append(key)
             else:
                 yield future.result()
-    finally:  # also when the caller stops early or a task fails
+        stopped = False
+    finally:  # also when the caller stops early or a task fails: what still runs is of no use then
+        if stopped:
+            held.close()
         pool.shutdown(cancel_futures=True)
+        held.close()
+        watched.close()
 
 
-def _start(task: Callable[..., Any], context: Any) -> None:
+def _start(task: Callable[..., Any], context: Any, watched: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asked
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
     _worker.update(task=task, context=context)
 
 
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+def _end_with(watched: Connection) -> None:
+    """End this process when the other end of the pipe is closed: by the process that asked, or because that one ended."""
+    with suppress(OSError):
+        watched.poll(None)
+    os._exit(1)
 
 
 def _run(key: Any) -> Any:

@@ -182,6 +182,7 @@ def observed(
     *,
     windows: Sequence[Window] | None = None,
     simulator: LoopSimulator | None = None,
+    workers: int = 1,
 ) -> Observation:
     """The Observation that the method of the study needs: with errors of its columns for tls, with the closed loop for those that simulate it.
 
@@ -193,7 +194,7 @@ def observed(
         Joint side, SI.
     study : Study
         Settings.
-    windows : sequence of (float or None, float or None), s, optional
+    windows, workers
         As in `runtime.observation.observation.observe`.
     simulator : LoopSimulator, optional
         Closed loop that made the records.
@@ -214,7 +215,7 @@ def observed(
         error = tls.tls_options(settings).position_error
         return stack([with_errors(model, record, study, observe(model, record, study), error) for record in whole])
     needed_by = "weights: covariance" if settings.weights == "covariance" else "" if method.system else settings.method
-    return observe(model, several, study, windows=windows, needed_by=needed_by)
+    return observe(model, several, study, windows=windows, needed_by=needed_by, workers=workers)
 
 
 def simulator_of(model: GeneratedModel, study: Study) -> LoopSimulator | None:

@@ -100,13 +100,15 @@ class Weights:
         W = self.matrix(observation)
         inverse = np.linalg.inv(np.linalg.qr(W, mode="r"))
         spread = np.zeros((W.shape[1], W.shape[1]))  # W' Omega W
+        instant = np.rint((observation.t - observation.t.min()) * observation.rate).astype(int)
+        instant += observation.record * (int(instant.max(initial=0)) + len(correlation))  # no two records are neighbours
         for j in range(observation.n):
-            at = np.rint((observation.t[observation.joint(j)] - observation.t.min()) * observation.rate).astype(int)
-            rows = np.zeros((at.max(initial=0) + 1, W.shape[1]))
-            rows[at] = W[observation.joint(j)]
+            own = observation.joint(j)
+            at, rows = instant[own], W[own]
             spread += correlation[0] * rows.T @ rows
             for k, r in enumerate(correlation[1:], start=1):
-                shifted = rows[:-k].T @ rows[k:]
+                _, first, later = np.intersect1d(at + k, at, assume_unique=True, return_indices=True)
+                shifted = rows[first].T @ rows[later]
                 spread += r * (shifted + shifted.T)
         C = inverse @ inverse.T @ spread @ inverse @ inverse.T
         return np.asarray(100 * np.sqrt(np.diag(C)))

@@ -56,6 +56,7 @@ def identify(
     friction: bool = False,
     variants: GeneratedModel | None = None,
     plausible: bool | None = None,
+    workers: int = 1,
     provenance: Mapping[str, Any] | None = None,
 ) -> Identification:
     """Parameters of a robot from its records, and how far to trust them.
@@ -80,6 +81,9 @@ def identify(
         The module of `symgen.variants`: other tables of frames and directions of gravity are tried on the records.
     plausible : bool, optional
         Whether record, study and robot file suit each other (`runtime.plausibility`); default: where `variants` is given.
+    workers : int, optional
+        Processes that read and filter long records by blocks; 1: this one. The results do not depend on it in any bit; a record in memory, or of one
+        piece, takes one process.
     provenance : mapping, optional
         What else reproduces the result; names of the records, hashes and versions are added.
 
@@ -98,7 +102,9 @@ def identify(
     simulator = simulator or simulator_of(model, study)
     if further is None:
         further = records_or_streams(study.validate.record, model, study.stream, missing=study.signals.admits_missing)
-    observed = partial(method_observation, model, study=study)
+    if workers < 1:
+        raise InputError(f"{workers} workers; expected 1, this process, or more")
+    observed = partial(method_observation, model, study=study, workers=workers)
     observation = observed(records, simulator=simulator)
     at("least squares, essential parameters")
     reduced = essential_of(observation, study.essential, linear_companion(study.estimate), model=model, provenance=provenance)

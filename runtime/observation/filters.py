@@ -151,13 +151,13 @@ def decimated(x: Array, factor: int, settings: Decimate | None) -> Array:
     return x if how is None else decimate(x.reshape(-1, x.shape[-1]), how).reshape(*x.shape[:-1], -1)
 
 
-def decimation_plan(N: int, factor: int, settings: Decimate | None) -> Plan | None:
-    """The decimation of N samples; None for a factor of 1."""
+def decimation_plan(N: int, factor: int, settings: Decimate | None, first: int | None = None) -> Plan | None:
+    """The decimation of N samples; None for a factor of 1. first : first sample kept; default: by the settings."""
     if factor == 1 or settings is None:
         return None
     pad = 3 * ORDER if settings.padding == "matlab" else 3 * (ORDER + 1)
     require_longer(N, pad)
-    return plan(N, factor, int(kept_samples(N, factor, settings.phase)[0]), pad)
+    return plan(N, factor, int(kept_samples(N, factor, settings.phase)[0]) if first is None else first, pad)
 
 
 def zero_phase(sos: Array, pad: int, x: Array, axis: int) -> Array:

@@ -17,6 +17,7 @@ segments of time (`runtime.observation.segments`), from which estimators that ne
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -24,11 +25,12 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.model.generated import GeneratedModel, check_states
-from runtime.observation.by_blocks import layout, observed_blocks
+from runtime.observation.by_blocks import BlockTask, Layout, instants_of, of_pieces, piece_rows, row_counts
 from runtime.observation.filters import States, decimated, filtered_states, median_filtered
-from runtime.observation.regressor_signals import decimated_columns, distinct_entries
+from runtime.observation.pieces import Piece, pieces
+from runtime.observation.regressor_signals import decimated_columns
 from runtime.observation.rows import Selection, select_rows
-from runtime.observation.segments import HeldRows, Segment, SegmentFactors, Window
+from runtime.observation.segments import HeldRows, SegmentFactors, Window
 from runtime.observation.states import certain_rows, observed_states
 from runtime.observation.system import (
     HELD,
@@ -72,6 +74,7 @@ def observe(
     constants: Mapping[str, float] | None = None,
     windows: Sequence[Window] | None = None,
     needed_by: str = "",
+    workers: int = 1,
 ) -> Observation:
     """Y = W X + rho of one record, or of several stacked: filtered, differentiated, decimated, rows left out.
 
@@ -93,6 +96,8 @@ def observe(
         Windows that `Observation.between` will be asked for where rows are reduced; default: study.validate.split, or the two halves.
     needed_by : str, optional
         What needs the rows themselves, such as a method of estimation.
+    workers : int, optional
+        Processes that observe the pieces of long records read by blocks; 1: this one. The results do not depend on it in any bit.
 
     Returns
     -------
@@ -102,7 +107,7 @@ def observe(
     Raises
     ------
     InputError
-        No record; `keep` with several records or a Stream; no row left.
+        No record; `keep` with several records or a Stream; no row left; processes that always die.
     SettingsError
         Rows would be reduced, and `needed_by` needs them.
     """
@@ -113,7 +118,7 @@ def observe(
     blocks = [record.block for record in several if not isinstance(record, Record)]
     if blocks:
         streams = [RecordStream(record, blocks[0]) if isinstance(record, Record) else record for record in several]
-        observation = _observed_by_blocks(model, streams, study, constants or {}, windows, needed_by)
+        observation = _observed_by_blocks(model, streams, study, constants or {}, windows, needed_by, workers)
         return observation if columns is None else observation.columns(columns)
     parts = []
     for record in several:
@@ -203,32 +208,44 @@ def _observed_by_blocks(
     constants: Mapping[str, float],
     windows: Sequence[Window] | None,
     needed_by: str,
+    workers: int,
 ) -> Observation:
     """Rows of several records read by blocks: held while W takes at most HELD bytes, else reduced.
 
     A record is read once; twice where rows are left out by speed, since their number is needed first.
     """
-    layouts = [layout(model, stream, study, constants) for stream in streams]
+    wholes = [instants_of(stream, study) for stream in streams]
+    cut = [pieces(k, stream, study.signals, whole) for k, (stream, whole) in enumerate(zip(streams, wholes, strict=True))]
+    every = [piece for own in cut for piece in own]
+    task = BlockTask(model, tuple(streams), study, constants).with_starts(every)
+    if task.filters_choose:
+        counted = dict(zip(every, of_pieces(row_counts, task, every, workers), strict=True))
+    else:
+        cut_whole = [Piece(k, 0, len(stream), whole, ()) for k, (stream, whole) in enumerate(zip(streams, wholes, strict=True))]
+        counted = {piece: row_counts(task, piece) for piece in cut_whole}
+    layouts = [
+        Layout.of(stream, study, whole, [part for piece, part in counted.items() if piece.record == k], task.skimmed.get(k))
+        for k, (stream, whole) in enumerate(zip(streams, wholes, strict=True))
+    ]
     counts = np.array([at.rows for at in layouts])
-    names, entries = tuple(model.BASE_PARAMETERS), distinct_entries(model, constants)
-    columns = [entries.k[entries.j == j] for j in range(streams[0].n)]
+    names, columns = tuple(model.BASE_PARAMETERS), task.columns
     held = 8 * int(counts.sum()) * len(names) <= HELD
     if needed_by and not held:
         raise rows_reduced(needed_by)
-    rows, rate = tuple(counts.sum(axis=0).tolist()), max(stream.rate / at.factor for stream, at in zip(streams, layouts, strict=True))
+    rows = tuple(counts.sum(axis=0).tolist())
+    rate = max(stream.rate / whole.factor for stream, whole in zip(streams, wholes, strict=True))
     span = min(at.t0 for at in layouts), max(at.t1 for at in layouts)
     cuts = tuple(windows if windows is not None else study.validate.split or halves(*span))
     length = float(study.estimate.options.get("block") or default_block(rows, rate))
     kept = HeldRows(columns, counts if held else np.array([at.shown for at in layouts]), len(names))
-    segments: list[Segment] = []
-    for number, (stream, at) in enumerate(zip(streams, layouts, strict=True)):
-        factors = SegmentFactors(number, at.t0, length, cuts, columns)
-        for block in observed_blocks(model, stream, study, at, entries, constants):
-            kept.take(number, *block)
-            if not held:
-                factors.take(*block)
-        segments += factors.finish()
-    settings = same_settings([_settings(study.signals, study.rows, at.factor) for at in layouts])
+    factors = tuple(SegmentFactors(k, at.t0, length, cuts, columns) for k, at in enumerate(layouts))
+    wanted = replace(task, factors=None if held else deepcopy(factors))
+    for piece, (blocks, own) in zip(every, of_pieces(piece_rows, wanted, every, workers), strict=True):
+        for block in blocks:
+            kept.take(piece.record, *block)
+        if own is not None:
+            factors[piece.record].join(own)
+    settings = same_settings([_settings(study.signals, study.rows, whole.factor) for whole in wholes])
     observation = Observation(
         W=kept.transposed.T,
         Y=kept.Y,
@@ -245,7 +262,8 @@ def _observed_by_blocks(
     if held:
         return observation
     no_rows = np.empty(0)
-    reduced = Reduced(tuple(segments), cuts, span, length, observation)
+    segments = tuple(segment for of_record in factors for segment in of_record.finish())
+    reduced = Reduced(segments, cuts, span, length, observation)
     return replace(observation, W=np.empty((0, len(names))), Y=no_rows, t=no_rows, record=no_rows.astype(int), rows=rows, reduced=reduced)
 
 

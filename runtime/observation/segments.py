@@ -145,6 +145,21 @@ class SegmentFactors:
                     first = np.count_nonzero(mask[j, :a])
                     joint.take(rows[j][:, first : first + np.count_nonzero(mask[j, a:b])])
 
+    def reduce(self) -> None:
+        """Keep nothing but triangular factors."""
+        for joints in self.R.values():
+            for rows in joints:
+                rows.factor()
+
+    def join(self, later: SegmentFactors) -> None:
+        """Rows that another one took, behind those taken so far."""
+        for key, joints in later.R.items():
+            if key in self.R:
+                for rows, other in zip(self.R[key], joints, strict=True):
+                    rows.join(other)
+            else:
+                self.R[key] = joints
+
     def finish(self) -> list[Segment]:
         """The segments, in time."""
 
@@ -168,6 +183,12 @@ class RowsFactor:
         self.pending += rows.shape[1]
         if self.pending >= PENDING:
             self.factor()
+
+    def join(self, later: RowsFactor) -> None:
+        """Rows that another one took."""
+        R = later.factor()
+        self.parts.append(R)
+        self.count, self.pending = self.count + later.count, self.pending + len(R)
 
     def factor(self) -> Array:
         """R of all rows so far."""

@@ -25,6 +25,7 @@ from runtime.settings.study import Lowpass, Signals
 Array = np.ndarray
 
 TRUNCATION = 1e-20
+DIFFERENCE = 2  # samples of reach, so that one-sided differences of second order find three samples
 
 
 class Stage(Protocol):
@@ -63,13 +64,18 @@ class Local:
         return y
 
 
+def memory(sos: Array) -> int:
+    """Samples after which a filter has forgotten all but TRUNCATION of its state; sos, shape (sections, 6)."""
+    slowest = max(np.abs(np.roots(section[3:])).max() for section in sos)
+    return ceil(log(TRUNCATION) / log(slowest))
+
+
 class ZeroPhase:
     """`signals.zero_phase` along the first axis: forward and backward after odd reflection of `pad` samples at each end."""
 
     def __init__(self, sos: Array, pad: int) -> None:
         self.sos, self.pad, self.zi = sos, pad, sosfilt_zi(sos)[..., None]
-        slowest = max(np.abs(np.roots(section[3:])).max() for section in sos)
-        self.ahead = ceil(log(TRUNCATION) / log(slowest))
+        self.ahead = memory(sos)
         self.waiting: list[Array] = []  # forward results not yet filtered backward
         self.state: Array | None = None  # of the forward filter; None before more than `pad` samples have come
         self.last = np.empty((0, 0))  # the last pad + 1 samples
@@ -211,8 +217,8 @@ def lowpass_stage(rate: float, low: Lowpass | None, signal: str) -> list[Stage]:
 
 
 def derivative_stage(rate: float, ends: str) -> Stage:
-    """`signals.derivative`; two samples of reach, so that its one-sided differences of second order find three samples."""
-    return Local(lambda x: derivative(x, rate, ends), 2)
+    """`signals.derivative`."""
+    return Local(lambda x: derivative(x, rate, ends), DIFFERENCE)
 
 
 def position_stage(rate: float, signals: Signals) -> Chain:

@@ -116,13 +116,13 @@ class RecordFiles:
             parts |= zip(groups, table.read(list(groups.values()), self.samples), strict=True)
         return self._converted(0, parts)[0]
 
-    def blocks(self, size: int) -> Iterator[Samples]:
-        """The same by blocks of `size` samples."""
-        asked = groups_of(self.columns, self.tables)
-        streams = [table.blocks(list(groups.values()), size) for table, groups in asked]
+    def blocks(self, size: int, start: int = 0, stop: int | None = None) -> Iterator[Samples]:
+        """The same by blocks of `size` samples; [start, stop) of them, default: all."""
+        asked, stop = groups_of(self.columns, self.tables), self.samples if stop is None else stop
+        streams = [table.blocks(list(groups.values()), size, start, stop) for table, groups in asked]
         keys = [key for _, groups in asked for key in groups]
         last = None
-        for a, blocks in zip(range(0, self.samples, size), zip(*streams, strict=True), strict=True):
+        for a, blocks in zip(range(start, stop, size), zip(*streams, strict=True), strict=True):
             samples, last = self._converted(a, dict(zip(keys, (x for block in blocks for x in block), strict=True)), last)
             yield samples
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -63,10 +63,18 @@ class FileStream(Stream):
     def _counted(self, start: int, count: int) -> Array:
         return np.arange(start, start + count) / self.rate
 
-    def blocks(self) -> Iterator[tuple[Array, Array, Array, Array]]:
-        """t (B,), q (B, n), tau (B, n), joint side, SI, and the columns without a position."""
-        start = 0
-        for x in self.opened.blocks(self.block):
+    @property
+    def in_any_order(self) -> bool:
+        """Whether samples are read without those before them."""
+        return all(table.in_any_order() for table in self.opened.tables)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Other processes read what they need."""
+        return {key: value for key, value in vars(self).items() if key != "_clock"}
+
+    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
+        """t (B,), q (B, n), tau (B, n), joint side, SI, and the columns without a position, of the samples [start, stop)."""
+        for x in self.opened.blocks(self.block, start, stop):
             known = 0.0 if x.tau_known is None else x.tau_known
             yield self._counted(start, len(x.q)) if x.t is None else x.t, x.q, x.tau - known, x.missing
             start += len(x.q)

@@ -51,8 +51,19 @@ class Stream(ABC):
         """Time of the samples, s, by blocks."""
 
     @abstractmethod
-    def blocks(self) -> Iterator[tuple[Array, Array, Array, Array]]:
-        """t (B,), q (B, n), tau (B, n), columns without a position, bool (B, n), or (B, 0) where none may be missing."""
+    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
+        """t (B,), q (B, n), tau (B, n), columns without a position, bool (B, n), or (B, 0) where none may be missing, of the samples [start, stop);
+        default: all."""
+
+    @property
+    def in_any_order(self) -> bool:
+        """Whether samples are read without those before them."""
+        return True
+
+    def part(self, start: int, stop: int) -> Stream:
+        """The samples [start, stop) as a stream of their own."""
+        same = {f.name: getattr(self, f.name) for f in fields(Stream)}
+        return PartStream(**{**same, "samples": stop - start}, stream=self, start=start)
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -70,10 +81,11 @@ class RecordStream(Stream):
     def times(self) -> Iterator[Array]:
         return (t for t, *_ in self.blocks())
 
-    def blocks(self) -> Iterator[tuple[Array, Array, Array, Array]]:
+    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
         missing = np.empty((len(self), 0), dtype=bool) if self.record.missing is None else self.record.missing.samples
-        for a in range(0, len(self), self.block):
-            samples = slice(a, a + self.block)
+        stop = len(self) if stop is None else stop
+        for a in range(start, stop, self.block):
+            samples = slice(a, min(a + self.block, stop))
             yield self.record.t[samples], self.record.q[samples], self.record.tau[samples], missing[samples]
 
 
@@ -93,8 +105,26 @@ class ChangedStream(Stream):
     def times(self) -> Iterator[Array]:
         return self.stream.times()
 
-    def blocks(self) -> Iterator[tuple[Array, Array, Array, Array]]:
-        return ((t, *self.change(q, tau), missing) for t, q, tau, missing in self.stream.blocks())
+    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
+        return ((t, *self.change(q, tau), missing) for t, q, tau, missing in self.stream.blocks(start, stop))
+
+    @property
+    def in_any_order(self) -> bool:
+        return self.stream.in_any_order
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PartStream(Stream):
+    """Consecutive samples of a stream, from number `start` on."""
+
+    stream: Stream
+    start: int
+
+    def times(self) -> Iterator[Array]:
+        return (t for t, *_ in self.blocks())
+
+    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
+        return self.stream.blocks(self.start + start, self.start + (len(self) if stop is None else stop))
 
 
 class Queue:

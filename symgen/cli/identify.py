@@ -44,6 +44,10 @@ def identify(
     plausible: Annotated[
         bool, typer.Option("--plausible/--no-plausible", help="Tell whether record, study and robot file suit each other, and what would.")
     ] = True,
+    workers: Annotated[
+        int,
+        typer.Option(min=1, help="Processes that read and filter long records by blocks; 1: this one. The results do not depend on it."),
+    ] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print estimate.json instead of tables.")] = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code 1 where the estimator does not end well."""
@@ -67,6 +71,7 @@ def identify(
             friction=friction,
             variants=variants_of(robot) if plausible else None,
             plausible=plausible,
+            workers=workers,
             provenance=computed,
         )
         if results is not None:

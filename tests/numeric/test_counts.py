@@ -12,12 +12,14 @@ import runtime
 import symgen
 from runtime import load_model
 from runtime.errors import InputError, SettingsError
+from runtime.observation.by_blocks import instants_of
 from runtime.observation.count_smoother import box_moments
 from runtime.observation.counts import MARGIN, STRETCH, read_counts, stretches
 from runtime.observation.encoder_advice import encoder_sentences
 from runtime.observation.encoder_lattice import lattice
 from runtime.observation.filters import filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states, observe
+from runtime.observation.pieces import pieces
 from runtime.observation.rows import select_rows
 from runtime.observation.spline_posterior import Basis, Factor, next_density
 from runtime.observation.states import UNCERTAIN, certain_rows, observed_states
@@ -277,6 +279,30 @@ def test_by_blocks_as_a_whole(planar, record, monkeypatch):
     assert whole.rows == blocks.rows and whole.dropped == blocks.dropped
     assert whole.findings == blocks.findings and "multiples of 2; the step of the record is 0.005" in whole.findings[0]
     np.testing.assert_allclose(blocks.W, whole.W, atol=1e-6 * np.abs(whole.W).max())
+
+
+@pytest.mark.parametrize(("step", "wrap"), [pytest.param(5e-3, 2**32, marks=pytest.mark.campaign), (4e-5, 2**16)])
+def test_in_pieces_as_a_whole(planar, monkeypatch, step, wrap):
+    """Pieces with the stretches that their filters reach, gaps in all and one over a cut, counts that wrap in the first piece too."""
+    t = np.arange(9000) / 250.0
+    states = motion(t)
+    torque = planar.inverse_dynamics(*states, planar.base_parameters(planar.VALUES))
+    q = (np.round(states[0] / step) + wrap / 2) % wrap * step
+    for samples in (slice(1000, 1003), slice(4600, 4640), slice(8000, 8020)):
+        q[samples, 1] = np.nan
+    record = Record(t, q, torque, rate=250.0, missing=np.isnan(q))
+    for name, value in (("counts.STRETCH", 1024), ("counts.MARGIN", 128), ("pieces.STRETCH", 1024), ("pieces.PIECE", 4 * 1024)):
+        monkeypatch.setattr(f"runtime.observation.{name}", value)
+    study = replace(STUDY, rows=replace(STUDY.rows, low_speed=0.05), signals=replace(STUDY.signals, step=step))
+    cut = pieces(0, RecordStream(record, 700), study.signals, instants_of(RecordStream(record, 700), study))
+    assert len(cut) == 2 and cut[1].begin > 0 and cut[0].end < len(t)
+    whole, blocks = observe(planar, record, study), observe(planar, RecordStream(record, 700), study)
+    assert whole.rows == blocks.rows and whole.dropped == blocks.dropped
+    assert [x for x in whole.findings if "changes by" not in x] == [x for x in blocks.findings if "changes by" not in x]
+    assert "63 samples are missing" in " ".join(blocks.findings) and ("wraps" in " ".join(blocks.findings)) == (wrap < 2**20)
+    np.testing.assert_array_equal(blocks.t, whole.t)
+    np.testing.assert_allclose(blocks.W, whole.W, atol=1e-9 * np.abs(whole.W).max())
+    np.testing.assert_allclose(blocks.Y, whole.Y, atol=1e-11 * np.abs(whole.Y).max())
 
 
 def test_identify_prints_what_the_reader_says_of_the_encoders(planar, record):

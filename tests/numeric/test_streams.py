@@ -3,6 +3,7 @@
 import gzip
 import sys
 import tracemalloc
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,7 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import planar_2r_model as planar
 import pytest
+from campaign import campaign
 
+import symgen
 from runtime import load_model, observe, read_record
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.essential import essential_of
@@ -21,7 +24,7 @@ from runtime.observation.system import halves, stack
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import are_large, open_stream
-from runtime.records.stream import RecordStream
+from runtime.records.stream import RecordStream, Stream
 from runtime.settings.study import EstimateSettings, RecordSettings, study_from_mapping
 
 N, RATE = 1003, 500.0
@@ -63,7 +66,7 @@ def write(kind, folder, samples):
     elif kind == "parquet":
         import polars
 
-        polars.DataFrame({**named, "note": ["x"] * N}).write_parquet(path, row_group_size=300)
+        polars.DataFrame({**named, "note": ["x"] * len(t)}).write_parquet(path, row_group_size=300)
     return {"files": [path.name], "columns": columns}
 
 
@@ -89,6 +92,11 @@ def test_formats_by_blocks(tmp_path, samples, kind, block):
     for found, expected in zip(list(zip(*parts, strict=True))[:3], (whole.t, whole.q, whole.tau), strict=True):
         np.testing.assert_array_equal(np.concatenate(found), expected)
     np.testing.assert_array_equal(np.concatenate(list(stream.times())), whole.t)
+    assert stream.in_any_order == (kind not in ("npz compressed", "csv gz"))
+    for start, stop in ((0, 1), (97, 117), (301, N)):
+        part = deepcopy(stream).part(start, stop)
+        for found, expected in zip([*zip(*part.blocks(), strict=True)][:3], (whole.t, whole.q, whole.tau), strict=True):
+            np.testing.assert_allclose(np.concatenate(found), expected[start:stop], rtol=0, atol=1e-14)
 
 
 def test_two_files_and_a_rate(tmp_path, samples):
@@ -194,11 +202,13 @@ def tx40(tx40_data):
     return model, study, read_records(study.record, model)[0]
 
 
-def by_blocks(model, streams, study, held=0):
-    """Observation of streams whose W may take `held` bytes; 0: reduced to triangular factors."""
+def by_blocks(model, streams, study, held=0, piece=2**20, workers=1):
+    """Observation of streams, in pieces of so many samples, whose W may take `held` bytes; 0: reduced to triangular factors."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("runtime.observation.observation.HELD", held)
-        return observed(model, streams, study)
+        patch.setattr("runtime.observation.pieces.PIECE", piece)
+        patch.setattr("runtime.observation.pieces.STRETCH", 0)
+        return observed(model, streams, study, workers=workers)
 
 
 def same(found, expected):
@@ -214,11 +224,11 @@ def same(found, expected):
         )
 
 
-@pytest.mark.parametrize("block", [777, 5000, 16384, 45000])
-def test_identification_of_the_tx40_by_blocks(tx40, block):
+@pytest.mark.parametrize(("block", "piece"), [(777, 2**20), (5000, 9000), (16384, 2**20), (45000, 2**20)])
+def test_identification_of_the_tx40_by_blocks(tx40, block, piece):
     model, study, record = tx40
     whole = observe(model, record, study)
-    reduction = by_blocks(model, [RecordStream(record, block)], study)
+    reduction = by_blocks(model, [RecordStream(record, block)], study, piece=piece)
     assert (reduction.rows, reduction.dropped, reduction.files) == (whole.rows, whole.dropped, whole.files)
     expected, found = (essential_of(x, study.essential, study.estimate, model=model) for x in (whole, reduction))
     same(found.all_parameters, expected.all_parameters)
@@ -231,7 +241,7 @@ def test_identification_of_the_tx40_by_blocks(tx40, block):
         np.testing.assert_allclose((one.relative_error, *one.per_joint), (other.relative_error, *other.per_joint), rtol=1e-8)
     assert weak_directions(reduction, study.estimate).groups == weak_directions(whole, study.estimate).groups
     np.testing.assert_allclose(reduction.first_rows.W, whole.W, atol=1e-10 * np.abs(whole.W).max())
-    held = by_blocks(model, [RecordStream(record, block)], study, held=whole.W.nbytes)
+    held = by_blocks(model, [RecordStream(record, block)], study, held=whole.W.nbytes, piece=piece)
     assert held.reduced is None and held.rows == whole.rows and np.array_equal(held.record, whole.record)
     for name in ("W", "Y", "t"):
         np.testing.assert_allclose(getattr(held, name), getattr(whole, name), rtol=0, atol=1e-10 * np.abs(getattr(whole, name)).max())
@@ -253,9 +263,28 @@ def test_identification_of_the_tx40_by_blocks(tx40, block):
 def test_settings_by_blocks(tx40, changed, estimator):
     model, study, record = tx40
     study = study_from_mapping({"estimate": estimator, **changed})
-    whole, reduction = observe(model, record, study), by_blocks(model, [RecordStream(record, 4001)], study)
-    assert (reduction.rows, reduction.dropped) == (whole.rows, whole.dropped)
-    same(*(estimate_of(x, study.estimate, model=model) for x in (reduction, whole)))
+    whole = observe(model, record, study)
+    for piece in (2**20, 7000):
+        reduction = by_blocks(model, [RecordStream(record, 4001)], study, piece=piece)
+        assert (reduction.rows, reduction.dropped) == (whole.rows, whole.dropped)
+        same(*(estimate_of(x, study.estimate, model=model) for x in (reduction, whole)))
+
+
+@campaign
+@pytest.mark.parametrize(("kind", "reader"), [("npz", "lowpass"), ("csv", "lowpass"), ("parquet", "counts")])
+def test_every_number_of_workers_gives_the_same_bits(tmp_path, kind, reader, monkeypatch):
+    t = np.arange(30_000) / 1000.0
+    q = np.stack([np.sin(3 * t) + 0.3 * np.sin(7.1 * t), np.cos(4 * t) - 0.5 * np.sin(2.3 * t)], axis=1)
+    given = settings(write(kind, tmp_path, (t, np.round(q / 1e-3) * 1e-3, 3 * q)))
+    monkeypatch.setattr("runtime.observation.counts.STRETCH", 4096)
+    monkeypatch.setattr("runtime.records.formats.text.HELD", 1000)
+    signals = {"decimate": {"factor": 5}, **({"reader": "counts", "step": 1e-3} if reader == "counts" else {})}
+    study = study_from_mapping({"signals": signals, "rows": {"low_speed": 0.1}})
+    model = symgen.model("planar_2r")
+    one, two = (by_blocks(model, [open_stream(given, folder=tmp_path, block=1000)], study, piece=6000, workers=k) for k in (1, 2))
+    assert one.rows == two.rows and one.reduced.span == two.reduced.span and len(one.segments) == len(two.segments) > 50
+    for a, b in ((one.factor.R, two.factor.R), (one.first_rows.W, two.first_rows.W), (one.first_rows.Y, two.first_rows.Y)):
+        assert a.tobytes() == b.tobytes()
 
 
 def test_several_records_by_blocks(tx40):
@@ -293,22 +322,18 @@ def test_what_needs_the_rows_is_refused(tx40):
         by_blocks(model, [RecordStream(record, 5000)], replace(short, rows=replace(short.rows, low_speed=100.0)))
 
 
-class Endless:
+class Endless(Stream):
     """A stream that is computed while it is read: two sines per joint of the planar arm, nothing kept."""
 
-    name, n, rate, files, block = "endless", 2, 1000.0, {}, 4096
-
     def __init__(self, samples):
-        self.samples = samples
+        super().__init__(name="endless", n=2, rate=1000.0, files={}, samples=samples, block=4096)
 
-    def __len__(self):
-        return self.samples
+    def times(self, start=0, stop=None):
+        stop = self.samples if stop is None else stop
+        return (np.arange(a, min(a + self.block, stop)) / self.rate for a in range(start, stop, self.block))
 
-    def times(self):
-        return (np.arange(a, min(a + self.block, self.samples)) / self.rate for a in range(0, self.samples, self.block))
-
-    def blocks(self):
-        for t in self.times():
+    def blocks(self, start=0, stop=None):
+        for t in self.times(start, stop):
             q = np.stack([np.sin(3 * t) + 0.3 * np.sin(7.1 * t), np.cos(4 * t) - 0.5 * np.sin(2.3 * t)], axis=1)
             yield t, q, 3 * q, np.empty((len(t), 0), dtype=bool)
 

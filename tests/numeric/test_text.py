@@ -64,13 +64,16 @@ def test_long_files_are_read_in_pieces(tmp_path, monkeypatch, comment):
     monkeypatch.setattr(text, "HELD", 1000)
     monkeypatch.setattr(text, "PIECE", 500)
     by_lines = text.TextTable._parts_by_lines
-    monkeypatch.setattr(text.TextTable, "_parts_by_lines", lambda *given: begun.append(given[-1]) or by_lines(*given))
+    monkeypatch.setattr(text.TextTable, "_parts_by_lines", lambda *given: begun.append(given[3]) or by_lines(*given))
     table = text.open_text(Source(written(tmp_path / "run.csv", lines)))
     assert table.samples([["t"]]) == len(expected)
     blocks = [np.stack(block) for block in table.parts(["tau1", "t"], 64)]
     assert [block.shape[1] for block in blocks] == [64] * 6 + [16]
     assert np.array_equal(np.concatenate(blocks, axis=1).T, expected[:, [2, 0]])
     assert begun == {None: [], 3: [0], 300: [256], 401: [384]}[comment]
+    for start, stop in ((0, 1), (63, 64), (1, 400), (250, 350), (399, 400)):
+        part = np.concatenate([np.stack(block) for block in table.parts(["tau1", "t"], 64, start, stop)], axis=1)
+        assert np.array_equal(part.T, expected[start:stop, [2, 0]])
 
 
 @pytest.mark.parametrize(

@@ -87,21 +87,21 @@ class Samples:
 def excerpts(stream: Stream, study: Study) -> list[Record]:
     """EXCERPTS of a stream, evenly spread over the window; the whole of a short one."""
     t0, t1 = study.rows.window
-    kept = [((t >= (-np.inf if t0 is None else t0)) & (t <= (np.inf if t1 is None else t1))) for t in stream.times()]
-    inside = np.flatnonzero(np.concatenate(kept))
+    start = stop = 0
+    for t in stream.times():
+        start += 0 if t0 is None else int(np.searchsorted(t, t0, side="left"))
+        stop += len(t) if t1 is None else int(np.searchsorted(t, t1, side="right"))
     number, length = EXCERPTS
-    if len(inside) <= number * length:
-        number, length = 1, len(inside)
-    starts = np.linspace(0, len(inside) - length, number).astype(int)
-    wanted = [inside[a : a + length] for a in starts]
+    if stop - start <= number * length:
+        number, length = 1, stop - start
+    wanted = [(a, a + length) for a in map(int, np.linspace(start, stop - length, number))]
     parts: list[list[tuple[Array, ...]]] = [[] for _ in wanted]
-    first = 0
-    for block in stream.blocks():
-        for part, numbers in zip(parts, wanted, strict=True):
-            own = numbers[(numbers >= first) & (numbers < first + len(block[0]))] - first
-            if len(own):
-                part.append(tuple(x[own] for x in block))
-        first += len(block[0])
+    for first, end in wanted if stream.in_any_order else [(wanted[0][0], wanted[-1][1])]:
+        for block in stream.blocks(first, end):
+            for part, (a, b) in zip(parts, wanted, strict=True):
+                if a < first + len(block[0]) and first < b:
+                    part.append(tuple(x[max(a - first, 0) : b - first] for x in block))
+            first += len(block[0])
     return [_excerpt(stream, *(np.concatenate(x) for x in zip(*part, strict=True))) for part in parts if part]
 
 

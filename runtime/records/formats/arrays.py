@@ -23,8 +23,8 @@ class Series(Protocol):
     def shape(self) -> tuple[int, ...]:
         """As stored."""
 
-    def blocks(self, size: int) -> Iterator[Array]:
-        """Consecutive samples, shape (B, k); (1, N) is a vector."""
+    def blocks(self, size: int, start: int = 0, stop: int | None = None) -> Iterator[Array]:
+        """Consecutive samples of [start, stop), shape (B, k); (1, N) is a vector."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +38,12 @@ class Held:
         """As stored."""
         return self.array.shape
 
-    def blocks(self, size: int) -> Iterator[Array]:
-        """Consecutive samples, shape (B, k)."""
+    def blocks(self, size: int, start: int = 0, stop: int | None = None) -> Iterator[Array]:
+        """Consecutive samples of [start, stop), shape (B, k)."""
         N = samples_of(self.shape)
         array = self.array.T if transposed(self.shape) else self.array
-        columns = array.reshape(N, prod(self.shape) // N)
-        return (columns[a : a + size] for a in range(0, N, size))
+        columns = array.reshape(N, prod(self.shape) // N)[:stop]
+        return (columns[a : a + size] for a in range(start, len(columns), size))
 
 
 def samples_of(shape: tuple[int, ...]) -> int:
@@ -80,9 +80,9 @@ class ArrayTable(Table):
             raise InputError(f"columns of different lengths: {', '.join(f'{k} {v}' for k, v in lengths.items())}", file=self.file)
         return next(iter(lengths.values()))
 
-    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
+    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
         self.samples([names])
-        return zip(*(self._series(name).blocks(size) for name in names), strict=True)
+        return zip(*(self._series(name).blocks(size, start, stop) for name in names), strict=True)
 
     def require(self, names: Sequence[str]) -> None:
         for name in names:

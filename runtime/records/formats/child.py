@@ -32,6 +32,15 @@ def serve() -> None:
     path, topic, decimal, memory, seconds = json.loads(sys.stdin.buffer.readline())
     source = Source(Path(path), topic, decimal)
     format_ = format_of(source.path)
+    try:
+        answer_requests(source, format_, answers, memory, seconds)
+    finally:
+        with suppress(OSError, KeyError):  # the process that asked may have ended before it can
+            Path(os.environ["TMPDIR"]).rmdir()
+
+
+def answer_requests(source: Source, format_: Format, answers: BinaryIO, memory: int, seconds: int) -> None:
+    """Until the pipe of requests is closed."""
     table: Table | None = None
     for request in sys.stdin.buffer:
         try:

@@ -115,15 +115,19 @@ class Table(ABC):
         """Raise InputError unless these columns are there and can be read."""
         check_names(names, self.names, self.file)
 
-    @abstractmethod
-    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
-        """One array of `size` samples by name, shape (B,) or (B, k), as often as there are blocks; names are in `names`."""
+    def in_any_order(self) -> bool:
+        """Whether samples are read without those before them, once their number is known."""
+        return True
 
-    def blocks(self, groups: Groups, size: int = BLOCK) -> Iterator[tuple[Array, ...]]:
-        """One array of `size` samples by group, shape (B, k): its columns side by side."""
+    @abstractmethod
+    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
+        """One array of `size` samples by name, shape (B,) or (B, k), as often as there are blocks in [start, stop); names are in `names`."""
+
+    def blocks(self, groups: Groups, size: int = BLOCK, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, ...]]:
+        """One array of `size` samples by group, shape (B, k): its columns side by side. Samples [start, stop); default: all."""
         names = list(dict.fromkeys(name for group in groups for name in group))
         self.require(names)
-        for parts in self.parts(names, size):
+        for parts in self.parts(names, size, start, stop):
             of = {name: np.asarray(part, dtype=float) for name, part in zip(names, parts, strict=True)}
             yield tuple(np.column_stack([of[name] for name in group]) if group else np.empty((len(parts[0]), 0)) for group in groups)
 

@@ -115,11 +115,11 @@ class IsolatedTable(Table):
     def note(self, groups: Groups) -> str:
         return "" if self.joints is None else str(self._value("note", groups))
 
-    def blocks(self, groups: Groups, size: int = BLOCK) -> Iterator[tuple[Array, ...]]:
-        return self._answers("blocks", groups, size)
+    def blocks(self, groups: Groups, size: int = BLOCK, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, ...]]:
+        return self._answers("blocks", groups, size, start, stop)
 
-    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
-        return self.blocks([[name] for name in names], size)
+    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
+        return self.blocks([[name] for name in names], size, start, stop)
 
     def widths(self, groups: Groups) -> list[int]:
         return cast(list[int], self._value("widths", groups))
@@ -129,6 +129,10 @@ class IsolatedTable(Table):
 
     def row(self, i: int) -> str:
         return str(self._value("row", i))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Another process that is sent the table starts one of its own."""
+        return {**vars(self), "idle": None}
 
     def close(self) -> None:
         """End the process."""

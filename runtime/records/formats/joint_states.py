@@ -75,10 +75,11 @@ class JointTable(Table):
             if name != "t" and (quantity not in QUANTITIES or not joint):
                 check_names([name], self.names, f"{self.file}, {self.topic}")
 
-    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
+    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
         self._choose(names)
-        for a in range(0, len(self.chosen), size):
-            yield [self._column(name, self.chosen[a : a + size]) for name in names]
+        chosen = self.chosen[:stop]
+        for a in range(start, len(chosen), size):
+            yield [self._column(name, chosen[a : a + size]) for name in names]
 
     def row(self, i: int) -> str:
         return f"message {self.chosen[i] + 1} of {self.topic}"

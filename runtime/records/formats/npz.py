@@ -71,15 +71,16 @@ class Stored:
     fortran: bool
     dtype: np.dtype
 
-    def blocks(self, size: int) -> Iterator[Array]:
-        """Consecutive samples, shape (B, k)."""
+    def blocks(self, size: int, start: int = 0, stop: int | None = None) -> Iterator[Array]:
+        """Consecutive samples of [start, stop), shape (B, k)."""
         N = samples_of(self.shape)
         columns = prod(self.shape) // N
         width = columns if self.fortran else 1  # files open at once
-        handles = [self._opened(c * N * self.dtype.itemsize) for c in range(width)]
+        stop = N if stop is None else min(stop, N)
+        handles = [self._opened((c * N + start * columns // width) * self.dtype.itemsize) for c in range(width)]
         try:
-            for start in range(0, N, size):
-                count = min(size, N - start)
+            for a in range(start, stop, size):
+                count = min(size, stop - a)
                 parts = [self._read(handle, count * columns // width).reshape(count, -1) for handle in handles]
                 yield parts[0] if width == 1 else np.hstack(parts)
         finally:
@@ -99,11 +100,19 @@ class Stored:
 
 @dataclass(eq=False, kw_only=True)
 class ArchiveTable(ArrayTable):
-    """Arrays of a .npz file."""
+    """Arrays of a .npz file.
 
-    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
+    compressed : whether one of them has to be unpacked from its start.
+    """
+
+    compressed: bool = False
+
+    def in_any_order(self) -> bool:
+        return not self.compressed
+
+    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
         with refused(ARCHIVE, self.file):
-            yield from super().parts(names, size)
+            yield from super().parts(names, size, start, stop)
 
     def scalar(self, name: str) -> float:
         with refused(ARCHIVE, self.file):
@@ -120,9 +129,9 @@ class MatrixTable(Table):
         self.require([name for group in groups for name in group])
         return samples_of(self.matrix.shape)
 
-    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
+    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
         with refused(SINGLE, self.file):
-            for x in self.matrix.blocks(size):
+            for x in self.matrix.blocks(size, start, stop):
                 yield [x[:, int(name) - 1] for name in names]
 
 
@@ -134,10 +143,12 @@ def open_npz(source: Source) -> ArchiveTable:
     with refused(ARCHIVE, source.file):
         with zipfile.ZipFile(source.content()) as archive:
             members = _distinct(archive, source.file)
+            compressed = any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist())
         stored = {name: _stored(partial(_member, source, member)) for name, member in members.items()}
         if objects := [name for name, x in stored.items() if x.dtype.hasobject]:
             raise TypeError(f"{objects[0]} holds pickled objects")
-    return ArchiveTable(file=source.file, size=source.size, arrays={name: x for name, x in stored.items() if is_numeric(x.dtype)})
+    arrays = {name: x for name, x in stored.items() if is_numeric(x.dtype)}
+    return ArchiveTable(file=source.file, size=source.size, arrays=arrays, compressed=compressed)
 
 
 def open_npy(source: Source) -> MatrixTable:

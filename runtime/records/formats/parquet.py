@@ -22,13 +22,13 @@ class ParquetTable(Table):
         self.require([name for group in groups for name in group])
         return self.rows
 
-    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
+    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
         import polars
 
         wanted = self.lazy.select(polars.col(list(names)).cast(polars.Float64))
-        step = max(READ // size, 1) * size
-        for a in range(0, self.rows, step):
-            read = wanted.slice(a, step).collect().to_numpy()
+        step, end = max(READ // size, 1) * size, self.rows if stop is None else min(stop, self.rows)
+        for a in range(start, end, step):
+            read = wanted.slice(a, min(step, end - a)).collect().to_numpy()
             for b in range(0, len(read), size):
                 yield list(read[b : b + size].T)
 

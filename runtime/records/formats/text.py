@@ -46,24 +46,37 @@ class TextTable(Table):
             raise InputError(f"no line of numbers under the header {', '.join(self.names)}", file=self.file)
         return count
 
-    def parts(self, names: Sequence[str], size: int) -> Iterator[Sequence[Array]]:
+    def in_any_order(self) -> bool:
+        return self._numbers is not None or (self._places is not None and not self.source.packed)
+
+    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
         indices = [self.names.index(name) for name in names]
-        waiting, done = Queue(), 0
+        waiting, done = Queue(), start
         try:
-            for numbers in map(self._loaded, self._pieces()) if self._numbers is None else [self._numbers]:
+            for numbers in self._read(start, stop) if self._numbers is None else [self._numbers[start:stop]]:
                 waiting.put(numbers[:, indices])
                 while waiting.count >= size:
                     yield list(waiting.take(size).T)
                     done += size
         except ValueError:
-            yield from self._parts_by_lines(indices, size, done)
+            yield from self._parts_by_lines(indices, size, done, stop)
         else:
             if waiting.count:
                 yield list(waiting.take(waiting.count).T)
 
-    def _parts_by_lines(self, indices: list[int], size: int, done: int) -> Iterator[Sequence[Array]]:
-        """The samples from number `done` on."""
-        lines = islice(self._lines(), done, None)
+    def _read(self, start: int, stop: int | None) -> Iterator[Array]:
+        """Numbers of the samples [start, stop), shape (B, len(names)), in pieces; ValueError where there is anything else."""
+        first, offset = max(place for place in self._places or [(0, 0)] if place[0] <= start) if start else (0, 0)
+        for _, piece in self._pieces(offset):
+            numbers = self._loaded(piece)
+            yield numbers[max(start - first, 0) : None if stop is None else stop - first]
+            first += len(numbers)
+            if stop is not None and first >= stop:
+                return
+
+    def _parts_by_lines(self, indices: list[int], size: int, start: int, stop: int | None) -> Iterator[Sequence[Array]]:
+        """The samples [start, stop)."""
+        lines = islice(self._lines(), start, stop)
         while block := list(islice(lines, size)):
             numbers, texts = zip(*block, strict=True)
             self.require_widths(numbers, texts)
@@ -76,22 +89,29 @@ class TextTable(Table):
                 plain = [_with_nan(text, self.delimiter) for text in plain]
                 yield list(np.loadtxt(plain, delimiter=self.delimiter, usecols=indices, ndmin=2, comments=None, quotechar='"').T)
 
-    def _pieces(self) -> Iterator[str]:
-        """What stands under the header, in pieces of whole lines; ValueError where a line is no line of numbers with decimal points."""
+    def _pieces(self, offset: int = 0) -> Iterator[tuple[int, str]]:
+        """What stands under the header, or from byte `offset` on, in pieces of whole lines, and the byte where each begins; ValueError where a line is
+        no line of numbers with decimal points."""
         if self.source.decimal != ".":
             raise ValueError("decimal comma")
         with opened(self.source.path) as stream:
-            lines_of_text = (line.removeprefix(BOM_UTF8) for line in iter(lambda: stream.readline(LONGEST + 1), b""))
-            first = next((line for line in lines_of_text if line.strip() and not line.lstrip().startswith(b"#")), b"")
-            if b"\r" in first.rstrip():
-                raise ValueError("lines that end with a carriage return alone")
-            rest = b"" if self.has_header else first
+            rest = b""
+            if not offset:
+                lines_of_text = (line.removeprefix(BOM_UTF8) for line in iter(lambda: stream.readline(LONGEST + 1), b""))
+                first = next((line for line in lines_of_text if line.strip() and not line.lstrip().startswith(b"#")), b"")
+                if b"\r" in first.rstrip():
+                    raise ValueError("lines that end with a carriage return alone")
+                rest = b"" if self.has_header else first
+            else:
+                stream.seek(offset)
+            begin = stream.tell() - len(rest)
             while block := stream.read(PIECE):
                 lines, newline, rest = (rest + block).rpartition(b"\n")
                 if newline:
-                    yield _regular(lines)
+                    yield begin, _regular(lines)
+                    begin += len(lines) + 1
             if rest:
-                yield _regular(rest)
+                yield begin, _regular(rest)
 
     def _loaded(self, lines: str) -> Array:
         """Numbers, shape (B, len(names)); ValueError where there is anything else."""
@@ -115,10 +135,19 @@ class TextTable(Table):
     @cached_property
     def _count(self) -> int:
         """Lines of numbers."""
+        return sum(1 for _ in self._lines()) if self._places is None else self._places[-1][0]
+
+    @cached_property
+    def _places(self) -> list[tuple[int, int]] | None:
+        """Number of the first sample of each piece of the file and the byte where it begins, then their end; None where a line holds anything else."""
+        places, samples = [], 0
         try:
-            return sum(piece.count("\n") + 1 for piece in self._pieces())
+            for begin, piece in self._pieces():
+                places.append((samples, begin))
+                samples += piece.count("\n") + 1
         except ValueError:
-            return sum(1 for _ in self._lines())
+            return None
+        return [*places, (samples, self.source.size)]
 
     @cached_property
     def _numbers(self) -> Array | None:
