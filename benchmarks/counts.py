@@ -1,10 +1,11 @@
 """Positions read as counts, beside positions as they are: the measured TX40 at coarser steps, other rates, uneven lines; a haptic device.
 
-    python benchmarks/counts.py [steps rates lines time haptic] [--seeds 20]
+    python benchmarks/counts.py [steps rates lines time haptic kr300] [--seeds 20]
 
 Positions of the record are rounded to steps of 2 pi/5000 ... 2 pi/100 at a random phase of every joint and seed, torques stay as recorded. Errors are
 those of the main parameters against the estimate from the record itself. Estimates are kept in counts_runs.jsonl as they come; the same command
 goes on from there. The record comes from `symgen datasets`. `haptic`: change of its essential parameters by CESTAC of law phase, encoders at the motors.
+`kr300`: what the detector says of two records of degrees, A.mat and B.mat in SYMGEN_DATA/kr300.
 """
 
 # ruff: noqa: E402
@@ -17,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,12 +26,14 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"  # before numpy
 
 import numpy as np
+from scipy.io import loadmat
 
 import symgen
-from runtime import load_model
+from runtime import InputError, load_model
 from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import estimate_of
 from runtime.observation.counts import read_counts
+from runtime.observation.encoder_lattice import lattice
 from runtime.observation.filters import filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states, observe
 from runtime.observation.rows import select_rows
@@ -227,6 +231,21 @@ def haptic(runs: int) -> str:
     return aligned(lines)
 
 
+def degrees(folder: Path) -> str:
+    """Smallest step of every axis that moves, and the distance from its lattice that the detector refuses."""
+    lines = [("record", "encoder", "axis", "what is said")]
+    for file, field in product(("A.mat", "B.mat"), ("act_pos_mot_deg", "act_pos_se_deg")):
+        record = loadmat(folder / file, squeeze_me=True, struct_as_record=False)["rec"]
+        for axis, x in enumerate(np.radians(getattr(record, field)), start=1):
+            if np.ptp(x):
+                try:
+                    said = f"{lattice(x[:, None]).step[0]:.3g}"
+                except InputError as error:
+                    said = str(error)
+                lines.append((file, field, str(axis), said))
+    return aligned(lines)
+
+
 def main() -> None:
     """Compute what is missing, write the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -240,6 +259,9 @@ def main() -> None:
             continue
         if part == "haptic":
             print(haptic(given.seeds))
+            continue
+        if part == "kr300":
+            print(degrees(Path(os.environ["SYMGEN_DATA"], "kr300")))
             continue
         rows = computed(file, list(wanted(part, given.seeds)), run)
         text = table(rows, {"steps": ("per_turn",), "rates": ("rate", "per_turn"), "lines": ("lines",)}[part])
