@@ -214,7 +214,7 @@ def test_refusals(planar):
 
 
 def test_another_interface_is_refused(tmp_path):
-    (tmp_path / "other.c").write_text(fused.SOURCE.read_text().replace("#define ABI 1", "#define ABI 77"))
+    (tmp_path / "other.c").write_text(fused.SOURCE.read_text().replace(f"#define ABI {fused.ABI}", "#define ABI 77"))
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))))
     (tmp_path / "kernels.c").write_text((tmp_path / "other.c").read_text())
     subprocess.run([compiler, "-std=c11", "-O0", "-shared", "-fPIC", "kernels.c", "-o", "other.so"], cwd=tmp_path, check=True)
@@ -291,7 +291,8 @@ int main(void)
     enum { N = 203, n = 9, L = 24, blocks = 5, S = 7, T = 16, K = 5*3 + 2, PAD = 12 };
     double sos[12] = {0.1, 0.2, 0.1, 1, -0.4, 0.1, 1, 2, 1, 1, -0.5, 0.2}, zi[4] = {0.2, -0.1, 0.3, 0.1};
     struct lowpass low = {2, PAD, sos, zi};
-    struct states states = {N, n, n, 1, PAD, 1, 100.0, 0.01, low, low, array(N*n, 1), calloc(N*n, 1), array(2*(N + 2*PAD)*LANES, 0), array(2*(N + 2*PAD)*LANES, 0)};
+    struct states states = {N, n, n, 1, PAD, 1, 100.0, 0.01, low, low, array(N*n, 1), calloc(N*n, 1), array(2*(N + 2*PAD)*LANES, 0), array(2*(N + 2*PAD)*LANES, 0),
+                            array(2*(N + 2*PAD)*LANES, 0)};
     int32_t bad = fused_states(&states);
     double *q = array(n*N, 0), *qd = array(n*N, 0), *qdd = array(n*N, 0);
     bad |= fused_gather(&states, 0, N, q, qd, qdd, N);

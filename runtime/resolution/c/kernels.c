@@ -1,6 +1,6 @@
 /* Inner loops of resolution studies, for any robot whose C file gives its distinct signals.
 
-    fused_states      median-filtered positions -> q, qd: low-pass forward and backward, central differences (runtime/observation/filters.py)
+    fused_states      median-filtered positions -> q, qd, qdd: low-pass forward and backward, central differences (runtime/observation/filters.py)
     fused_gather      rows of q, qd, qdd from these
     fused_decimated   states -> signals -> kept samples of the zero-phase decimation (runtime/observation/decimation.py); the signals are never stored
     fused_normal      rows -> A_j = [W_j Y_j]'[W_j Y_j] of every joint on its own columns
@@ -18,11 +18,10 @@ one processor, -DSCALAR vector types too.
 #include <stdint.h>
 #include <string.h>
 
-#define ABI 1
+#define ABI 2
 #define STATE 8   /* real numbers of a state of the decimation filter, of order 8; also the most kept samples of a block */
 #define LANES 8   /* joints filtered together, samples summed together */
 #define SIDE 4    /* rows and columns of one tile of a Gram matrix */
-#define MOST 10   /* sections of the low-pass */
 #define SPAN 512  /* samples of one block of rows */
 #define WHOLE (SIDE*LANES) /* samples that sums take at once, at most */
 #define APART (SPAN + LANES)
@@ -52,8 +51,8 @@ struct lowpass {
     const double *sos, *zi;
 };
 
-/* Positions, given[t*sample + j*joint], moved by +step or -step as up (N, n) says if it is there; filtered positions and velocities, in groups
-of LANES joints: (groups, N + 2 pad, LANES), the N samples in the middle. pad: the larger one of the two filters. ends: differences there are
+/* Positions, given[t*sample + j*joint], moved by +step or -step as up (N, n) says if it is there; filtered positions, velocities and
+accelerations, in groups of LANES joints: (groups, N + 2 pad, LANES), the N samples in the middle. pad: the larger one of the two filters. ends: differences there are
 1 one-sided, 2 of second order. */
 struct states {
     int64_t N, n, sample, joint, pad, ends;
@@ -61,7 +60,7 @@ struct states {
     struct lowpass on_q, on_qd;
     const double *given;
     const uint8_t *up;
-    double *q, *qd;
+    double *q, *qd, *qdd;
 };
 
 /* Signals of the robot: of `count`, S are wanted. They are evaluated TILE = `tile` samples at a time: sample p of a block of samples is
@@ -168,15 +167,18 @@ static const struct kernels *best(void)
 
 /* ------------------------------------------------------------------------------------------------------------------------- states */
 
-/* One pass of the sections, direct form II transposed, over R samples `step` apart, started in the steady state of the first. */
-INLINE void sections(double *x, int64_t R, ptrdiff_t step, const struct lowpass *f, const int64_t count)
+/* One pass of `count` sections, direct form II transposed, over R samples `step` apart; `first` is the one in whose steady state they start. dx,
+unless NULL: differences of a pass back, (x_(t + 1) - x_(t - 1))/width, but for its first two samples. They are free beside the filter, which waits
+for itself. */
+INLINE void sections(double *x, int64_t R, ptrdiff_t step, const double *sos, const double *zi, const double *first, const int64_t count,
+                     double *restrict dx, double width)
 {
-    double c[6*MOST], z[2*MOST][LANES];
-    memcpy(c, f->sos, (size_t)(6*count)*sizeof *c);
+    double c[12], z[4][LANES];
+    memcpy(c, sos, (size_t)(6*count)*sizeof *c);
     for (int64_t s = 0; s < 2*count; s++)
         for (int l = 0; l < LANES; l++)
-            z[s][l] = f->zi[s]*x[l];
-    for (; R > 0; R--, x += step)
+            z[s][l] = zi[s]*first[l];
+    for (int64_t t = 0; t < R; t++, x += step) {
         for (int64_t s = 0; s < count; s++) {
             const double *b = c + 6*s, *a = b + 3;
             for (int l = 0; l < LANES; l++) {
@@ -186,20 +188,32 @@ INLINE void sections(double *x, int64_t R, ptrdiff_t step, const struct lowpass 
                 x[l] = y;
             }
         }
+        if (dx) {
+            for (int l = 0; l < LANES && t > 1; l++)
+                dx[l] = (x[l + 2*LANES] - x[l])/width;
+            dx -= LANES;
+        }
+    }
 }
 
-PLAIN static void pass(double *x, int64_t R, ptrdiff_t step, const struct lowpass *f)
+/* All sections of a filter, two at a time. */
+PLAIN static void pass(double *x, int64_t R, ptrdiff_t step, const struct lowpass *f, double *dx, double width)
 {
-    if (f->sections == 1)
-        sections(x, R, step, f, 1);
-    else if (f->sections == 2)
-        sections(x, R, step, f, 2);
-    else
-        sections(x, R, step, f, f->sections);
+    double first[LANES];
+    memcpy(first, x, sizeof first);
+    for (int64_t s = 0; s < f->sections; s += 2) {
+        const double *sos = f->sos + 6*s, *zi = f->zi + 2*s;
+        double *slopes = s + 2 < f->sections ? NULL : dx;
+        if (s + 1 == f->sections)
+            sections(x, R, step, sos, zi, first, 1, slopes, width);
+        else
+            sections(x, R, step, sos, zi, first, 2, slopes, width);
+    }
 }
 
-/* Forward and backward over N samples of LANES joints; `pad` samples on either side of x are there for the odd reflections. */
-static void zero_phase(double *x, int64_t N, const struct lowpass *f)
+/* Forward and backward over N samples of LANES joints, and the central differences of the result; `pad` samples on either side of x and dx are
+there for the odd reflections. */
+static void zero_phase(double *x, int64_t N, const struct lowpass *f, double *dx, double width)
 {
     const double *last = x + (N - 1)*LANES;
     for (int64_t t = 1; t <= f->pad; t++)
@@ -208,8 +222,8 @@ static void zero_phase(double *x, int64_t N, const struct lowpass *f)
             x[(N - 1 + t)*LANES + l] = 2.0*last[l] - last[l - t*LANES];
         }
     const int64_t R = N + 2*f->pad;
-    pass(x - f->pad*LANES, R, LANES, f);
-    pass(x + (N - 1 + f->pad)*LANES, R, -LANES, f);
+    pass(x - f->pad*LANES, R, LANES, f, NULL, 0.0);
+    pass(x + (N - 1 + f->pad)*LANES, R, -LANES, f, dx + (N + f->pad)*LANES, width);
 }
 
 /* One sample of the difference. */
@@ -227,50 +241,50 @@ INLINE void slope(const double *x, int64_t t, int64_t N, double h, int64_t ends,
             dx[l] = -1.5/h*now[l] + 2.0/h*now[l + LANES] + -0.5/h*now[l + 2*LANES];
 }
 
-PLAIN static void difference(const double *x, double *dx, int64_t N, double rate, int64_t ends)
+/* The filter, if there is one, of x, and the differences of what it gives. */
+PLAIN static void filtered_slope(double *x, int64_t N, const struct lowpass *f, double rate, int64_t ends, double *dx)
 {
-    for (int64_t t = 0; t < N; t++)
+    if (f->sections)
+        zero_phase(x, N, f, dx, 2.0*(1.0/rate));
+    for (int64_t t = 0; t < N; t += f->sections ? N - 1 : 1)
         slope(x, t, N, 1.0/rate, ends, dx + t*LANES);
 }
 
 int32_t fused_states(const struct states *a)
 {
     const int64_t N = a->N, n = a->n, size = (N + 2*a->pad)*LANES;
-    if (n < 1 || a->ends < 1 || a->ends > 2 || N <= a->ends || N <= a->pad || a->on_q.pad > a->pad || a->on_qd.pad > a->pad
-        || a->on_q.sections > MOST || a->on_qd.sections > MOST)
+    if (n < 1 || a->ends < 1 || a->ends > 2 || N <= a->ends || N <= a->pad || a->on_q.pad > a->pad || a->on_qd.pad > a->pad)
         return 1;
     for (int64_t j = 0, group = 0; j < n; j += LANES, group += size) {
-        double *x = a->q + group + a->pad*LANES, *dx = a->qd + group + a->pad*LANES;
+        double *x = a->q + group + a->pad*LANES, *dx = a->qd + group + a->pad*LANES, *ddx = a->qdd + group + a->pad*LANES;
         const int64_t used = n - j < LANES ? n - j : LANES;
-        for (int64_t t = 0; t < N; t++)
-            for (int64_t l = 0; l < LANES; l++)
-                x[t*LANES + l] = l < used ? a->given[t*a->sample + (j + l)*a->joint] : 0.0;
-        for (int64_t t = 0; t < N && a->up; t++)
-            for (int64_t l = 0; l < used; l++)
-                x[t*LANES + l] += a->step*(2*a->up[t*n + j + l] - 1); /* no branch: its outcome is random */
-        if (a->on_q.sections)
-            zero_phase(x, N, &a->on_q);
-        difference(x, dx, N, a->rate, a->ends);
-        if (a->on_qd.sections)
-            zero_phase(dx, N, &a->on_qd);
+        for (int64_t t = 0; t < N; t++) {
+            const double *given = a->given + t*a->sample + j*a->joint;
+            for (int64_t l = 0; l < used; l++) /* no branch on a bit: its outcome is random */
+                x[t*LANES + l] = given[l*a->joint] + (a->up ? a->step*(2*a->up[t*n + j + l] - 1) : 0.0);
+            for (int64_t l = used; l < LANES; l++)
+                x[t*LANES + l] = 0.0;
+        }
+        filtered_slope(x, N, &a->on_q, a->rate, a->ends, dx);
+        filtered_slope(dx, N, &a->on_qd, a->rate, a->ends, ddx);
     }
     return 0;
 }
 
 /* Samples t .. t + m - 1 of q, qd and qdd, rows `stride` apart. */
-PLAIN static void gather(const struct states *a, int64_t t, int64_t m, double *q, double *qd, double *qdd, int64_t stride)
+static void gather(const struct states *a, int64_t t, int64_t m, double *q, double *qd, double *qdd, int64_t stride)
 {
-    const double h = 1.0/a->rate;
+    const double *const from[3] = {a->q, a->qd, a->qdd};
+    double *const to[3] = {q, qd, qdd};
     for (int64_t j = 0; j < a->n; j += LANES) {
-        const int64_t group = j/LANES*(a->N + 2*a->pad)*LANES + a->pad*LANES, used = a->n - j < LANES ? a->n - j : LANES;
-        const double *x = a->q + group, *dx = a->qd + group;
-        for (int64_t i = 0; i < m; i++) {
-            double ddx[LANES];
-            slope(dx, t + i, a->N, h, a->ends, ddx);
-            for (int64_t l = 0; l < used; l++) {
-                q[(j + l)*stride + i] = x[(t + i)*LANES + l];
-                qd[(j + l)*stride + i] = dx[(t + i)*LANES + l];
-                qdd[(j + l)*stride + i] = ddx[l];
+        const int64_t first = (j/LANES*(a->N + 2*a->pad) + a->pad + t)*LANES, used = a->n - j < LANES ? a->n - j : LANES;
+        for (int k = 0; k < 3; k++) {
+            const double *x = from[k] + first;
+            for (int64_t i = 0, part; i < m; i += part, x += part*LANES) {
+                part = m - i < LANES ? m - i : LANES;
+                for (int64_t l = 0; l < used; l++)
+                    for (int64_t p = 0; p < part; p++)
+                        to[k][(j + l)*stride + i + p] = x[p*LANES + l];
             }
         }
     }

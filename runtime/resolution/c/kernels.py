@@ -34,7 +34,7 @@ Array = np.ndarray
 
 SOURCE = Path(__file__).with_name("kernels.c")
 FUSED_FLAGS = tuple({"-O2": "-O3", "-ffp-contract=off": "-ffp-contract=fast"}.get(flag, flag) for flag in FLAGS)
-ABI = 1
+ABI = 2
 LANES, SIDE, SPAN, STATE = 8, 4, 512, 8  # of kernels.c; LANES is 1 without vector types
 TOGETHER = 640  # most samples of signals evaluated together, except where one block is longer: these stay in cache
 REFUSALS = {1: "arguments that do not fit each other", 2: "a block that the signals of the robot refuse"}
@@ -60,7 +60,7 @@ class StatesStructure(ctypes.Structure):
         ("step", ctypes.c_double),
         ("on_q", LowpassStructure),
         ("on_qd", LowpassStructure),
-        *_fields(pointers="given up q qd"),
+        *_fields(pointers="given up q qd qdd"),
     ]
 
 
@@ -177,9 +177,9 @@ class FilteredStates:
         pad, ends = max(on_q.pad, on_qd.pad), 1 if signals.ends == "one-sided" else 2
         require_longer(self.N, max(pad, ends))
         groups = -(-self.n // LANES)
-        lanes = room.array("lanes", 2, groups, self.N + 2 * pad, LANES)
+        lanes = room.array("lanes", 3, groups, self.N + 2 * pad, LANES)
         steps = [step // given.itemsize for step in given.strides]
-        pointers = address(given), None if up is None else address(up), address(lanes[0]), address(lanes[1])
+        pointers = address(given), None if up is None else address(up), *map(address, lanes)
         self.lanes, self.structure = lanes, StatesStructure(self.N, self.n, *steps, pad, ends, rate, step, on_q, on_qd, *pointers)
         call("states", ctypes.byref(self.structure))
 
