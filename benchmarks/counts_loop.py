@@ -28,9 +28,11 @@ from estimators import AROUND, bench, determined, with_encoder
 from runtime import InputError
 from runtime.estimators.closed_loop import ClosedLoop, closed_loop
 from runtime.estimators.methods import estimate_of
+from runtime.model.drives import Drives
 from runtime.observation.counts import read_counts
 from runtime.observation.filters import lowpass_filtered
 from runtime.observation.observation import Observation, decimated_torque
+from runtime.observation.torque_errors import widened
 from runtime.records.record import Record
 from runtime.settings.study import EstimateSettings, Lowpass, Study
 from runtime.table import aligned
@@ -72,7 +74,8 @@ def estimates(robot: str, step: float, seed: int, simulating: bool) -> list[dict
         except InputError as error:
             row |= {"status": str(error)}
         rows.append(row)
-    return [*rows, {**key, "method": "calibration", "status": "ok", "X": calibration(robot, run, step)}]
+    X = np.array([start.get(name, 0.0) for name in b.model.BASE_PARAMETERS])
+    return [*rows, {**key, "method": "calibration", "status": "ok", "X": calibration(robot, run, step, X)}]
 
 
 @cache
@@ -91,8 +94,9 @@ def observed(robot: str, record: Record, study: Study) -> Observation:
     return replace(loop, study=study, parts=(part,), law=()).measured()
 
 
-def calibration(robot: str, run: Any, step: float) -> list[float]:
-    """rms of the errors of q, qd, qdd over their stated deviations, then of the errors below BAND, where the arm is faster than the rows of the study need."""
+def calibration(robot: str, run: Any, step: float, X: Array) -> list[float]:
+    """rms of the errors of q, qd, qdd over their stated deviations, of the errors below BAND, and over deviations widened by the torques and X, where the
+    arm is faster than the rows of the study need."""
     study = bench(robot).study
     law = with_encoder(robot, step).law
     reading = read_counts((run.record().q - law.offset) @ law.R.T, run.rate, step)
@@ -103,8 +107,14 @@ def calibration(robot: str, run: Any, step: float) -> list[float]:
     errors[0] = errors[0] - np.median(errors[0], axis=0)  # floor against round cannot be told
     low = Lowpass(cutoff=BAND[robot])
     slow = [lowpass_filtered(e, run.rate, low) for e in errors]
-    stated = (reading.s_q, reading.s_qd, reading.s_qdd)
-    return [float(np.sqrt(np.mean(((e / s)[moving]) ** 2))) for part in (errors, slow) for e, s in zip(part, stated, strict=True)]
+    drives = Drives(law.R, law.offset, np.ones(len(law.R)))
+    wide = reading if not X.any() else widened(reading, bench(robot).model, run.record().tau, X, run.rate, drives=drives)
+    parts = ((errors, reading), (slow, reading), (errors, wide))
+    return [
+        float(np.sqrt(np.mean(((e / s)[moving]) ** 2)))
+        for part, of in parts
+        for e, s in zip(part, (of.s_q, of.s_qd, of.s_qdd), strict=True)
+    ]
 
 
 def table(rows: Sequence[dict[str, Any]], robot: str) -> str:
@@ -122,7 +132,7 @@ def table(rows: Sequence[dict[str, Any]], robot: str) -> str:
                 continue
             if method == "calibration":
                 z = np.mean([r["X"] for r in good], axis=0)
-                for label, part in (("", z[:3]), (f" below {BAND[robot]:g} Hz", z[3:])):
+                for label, part in (("", z[:3]), (f" below {BAND[robot]:g} Hz", z[3:6]), (", with torques", z[6:])):
                     lines.append(
                         (
                             f"{step:.3g}",

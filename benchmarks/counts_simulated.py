@@ -9,8 +9,8 @@ Motions of the TX40 with an exact encoder, quantised afterwards at a random phas
     points   from point to point through that loop, joints at rest 5 % of the time
 
 Torques are those of the values of the robot file with white noise of 0.05 N m and noise up to 5 Hz of 3 % of the torque (`sigma`: 1 %); its dry
-friction is one of FRICTION. Parts: `rows`, errors against the estimate from the exact positions of the same record, by the deviations below which a row is left
-out; `sigma`, errors against the truth over stated sigma; `gaps`, errors of the filtered acceleration where samples are missing. Estimates are kept in counts_simulated_runs.jsonl; the same command goes on from there.
+friction is one of FRICTION. Parts: `rows`, errors against the estimate from the exact positions of the same record, by what becomes of rows of uncertain
+direction; `sigma`, errors against the truth over stated sigma; `gaps`, errors of the filtered acceleration where samples are missing. Estimates are kept in counts_simulated_runs.jsonl; the same command goes on from there.
 """
 
 # ruff: noqa: E402
@@ -33,6 +33,7 @@ from counts import MAIN, STEPS, quantised
 from estimators import TX40, bench
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
+from scipy.special import erf
 from simulation import LAW
 
 from runtime.estimators.essential import essential_of
@@ -59,6 +60,7 @@ FRICTION: Mapping[str, Callable[[Array], Array]] = {
     "Stribeck": lambda s: np.sign(s) * (1 + 0.3 * np.exp(-((s / 0.05) ** 2))),
 }
 SIGMA_CASES = ((5000, ""), (1000, ""), (250, ""), (1000, "random 0.03"), (1000, "random 0.1"))
+POWERS = (0.5, 1)  # weights of rows by the certainty of their direction
 THRESHOLDS = (0.0, 0.35, 0.5, 0.7, 1.0)  # deviations of a speed below which its rows are left out
 
 
@@ -140,7 +142,7 @@ def solved(W: Array, Y: Array) -> Array:
 
 
 def rows_of(kind: str, seed: int) -> Iterator[dict[str, Any]]:
-    """Main parameters of one motion by step, friction and threshold, with those from the exact positions."""
+    """Main parameters of one motion by step, friction and treatment of uncertain rows, with those from the exact positions."""
     moved, b = motion(kind, seed), bench("tx40")
     t = np.arange(len(moved.q)) / RATE
     records = {name: Record(t, moved.q, torque(moved, name, np.random.default_rng([seed, 11]), 0.03), rate=RATE) for name in FRICTION}
@@ -156,12 +158,32 @@ def rows_of(kind: str, seed: int) -> Iterator[dict[str, Any]]:
         read = observed_states(b.model, quantised(moved.q, step, seed), RATE, settings(step).signals)
         W = observed(read, records["sign"], names).W
         selection = select_rows(records["sign"], read.qd, settings().signals, settings().rows)
-        for least in THRESHOLDS:
-            used = certain_rows(b.model, read[selection.samples][selection.kept], deviations=least)[selection.mask]
+        for label, (weight, columns) in treatments(read[selection.samples][selection.kept], selection.mask, names).items():
+            used = weight > 0
+            rows = (W * columns)[used] * weight[used, None]
             for name, y in Y.items():
-                X = solved(W[used], y[used])[main].tolist()
-                key = {"part": "rows", "kind": kind, "seed": seed, "per_turn": per_turn, "friction": name, "least": least}
+                X = solved(rows, y[used] * weight[used])[main].tolist()
+                key = {"part": "rows", "kind": kind, "seed": seed, "per_turn": per_turn, "friction": name, "rows": label}
                 yield {**key, "X": X, "exact": reference[name], "left": float(1 - used.mean())}
+
+
+def treatments(states: States, mask: Array, names: Sequence[str]) -> dict[str, tuple[Array, Array]]:
+    """What becomes of rows of uncertain direction: weights of the rows, shape (r,), and factors of their columns, (r, b).
+
+    E = |E sign(s)| of a column of dry friction; of a row the least of those that act on its joint.
+    """
+    assert states.errors is not None
+    model, (n, K) = bench("tx40").model, mask.shape
+    certainty, columns = np.ones((n, K)), np.ones((n, K, len(names)))
+    for s in switches(model, names, passive="left out"):
+        E = erf(np.abs(states.qd @ s.G) / (np.sqrt(2) * states.errors.along(s.G)))
+        certainty[list(s.joints)] = np.minimum(certainty[list(s.joints)], E)
+        columns[:, :, s.column] = E
+    alike = np.ones(columns.shape)
+    cases = {f"out below {least:g}": (1.0 * certain_rows(model, states, deviations=least), alike) for least in THRESHOLDS}
+    cases |= {f"weight E^{p:g}": (certainty**p, alike) for p in POWERS}
+    cases |= {f"E sign, weight E^{p:g}": (certainty**p, columns) for p in (0, *POWERS)}
+    return {label: (weight[mask], of_columns[mask]) for label, (weight, of_columns) in cases.items()}
 
 
 def sigma_of(kind: str, seed: int) -> Iterator[dict[str, Any]]:
@@ -188,13 +210,11 @@ def rms(x: Array) -> float:
 
 
 def rows_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Median over the motions of the rms error, %, geometric mean over frictions; a line for each kind of motion and threshold."""
-    lines: list[Sequence[str]] = [
-        ("motion", "left out below", *(f"2 pi/{k}" for k in STEPS), "geometric mean", "pure Coulomb", "tanh 0.05")
-    ]
+    """Median over the motions of the rms error, %, geometric mean over frictions; a line for each kind of motion and treatment of its rows."""
+    lines: list[Sequence[str]] = [("motion", "rows", *(f"2 pi/{k}" for k in STEPS), "geometric mean", "pure Coulomb", "tanh 0.05")]
     for kind in dict.fromkeys(r["kind"] for r in rows):
-        for least in THRESHOLDS:
-            mine = [r for r in rows if r["kind"] == kind and r["least"] == least]
+        for label in dict.fromkeys(r["rows"] for r in rows):
+            mine = [r for r in rows if r["kind"] == kind and r["rows"] == label]
             error = {
                 (k, f): np.median(
                     [rms(100 * (np.array(r["X"]) / r["exact"] - 1)) for r in mine if (r["per_turn"], r["friction"]) == (k, f)]
@@ -205,7 +225,7 @@ def rows_table(rows: Sequence[Mapping[str, Any]]) -> str:
             mean = lambda keys, error=error: np.exp(np.mean([np.log(error[key]) for key in keys]))  # noqa: E731
             by_step = [mean([(k, f) for f in FRICTION]) for k in STEPS]
             by_friction = [mean([(k, f) for k in STEPS]) for f in ("sign", "tanh 0.05")]
-            lines.append((kind, f"{least:g}", *(f"{x:.2f}" for x in (*by_step, mean(list(error)), *by_friction))))
+            lines.append((kind, label, *(f"{x:.2f}" for x in (*by_step, mean(list(error)), *by_friction))))
     return aligned(lines)
 
 

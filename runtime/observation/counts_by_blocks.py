@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from runtime.errors import InputError
 from runtime.observation.counts import Gaps, read_stretch
 from runtime.observation.encoder_lattice import Lattice, Unwrapping, lattice
 from runtime.records.stream import Queue
@@ -115,7 +116,10 @@ class CountStage:
             x = self.held.take(self.held.count)
             own = x[: end - begin]
             if self.start is None:
-                n = position.shape[1]
+                n, unknown = position.shape[1], np.isnan(own).all(axis=0)
+                if self.left and unknown.any():
+                    text = f"no sample is known among the first {end}, which tell the step; set stream: off"
+                    raise InputError(f"encoder {np.argmax(unknown) + 1}: {text}", file=self.name)
                 self.start = CountStart(lattice(own, self.step, name=self.name), Unwrapping(n, self.name), Gaps(n))
             if begin in self.remembered:
                 self.starts[begin] = deepcopy(self.start)

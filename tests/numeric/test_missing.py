@@ -142,6 +142,17 @@ def test_by_blocks_as_a_whole(monkeypatch, margin):
     np.testing.assert_allclose(X, planar.base_parameters(planar.VALUES), atol=0.1 if margin == 1000 else 0.5)
 
 
+def test_a_first_stretch_without_a_sample(monkeypatch):
+    """The whole record takes step and phase from later samples; by blocks they cannot be known."""
+    monkeypatch.setattr("runtime.observation.counts.STRETCH", 1000)
+    monkeypatch.setattr("runtime.observation.counts.MARGIN", 200)
+    late = replace(RECORD, missing=MISSING | ((T < 1.3)[:, None] & [True, False]))
+    observation = observe(planar, late, STUDY)
+    assert observation.t.min() > 1.3 and np.isfinite(observation.W).all()
+    with pytest.raises(InputError, match="encoder 1: no sample is known among the first 1200, which tell the step; set stream: off"):
+        observe(planar, RecordStream(late, 700), STUDY)
+
+
 def test_coupled_motors():
     """Motor 6 turns with joints 5 and 6. Recorded at the motors, each stands for itself; recorded at the joints, motor 6 lacks what either lacks."""
     model = load_model("tx40")
