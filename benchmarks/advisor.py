@@ -48,7 +48,7 @@ RUNS = {"emps": 100, "tx40": 60, "haptic": 30}
 LEVELS = 8
 ROUNDS = 5
 RATIO = 1.3
-REAL_RUNS = {"emps": 100, "tx40": 24, "haptic": 24}
+REAL_RUNS = {"emps": 60, "tx40": 12, "haptic": 12}
 HAPTIC_SHARE = 4  # of the motion of the haptic device, where real encoders are judged
 
 
