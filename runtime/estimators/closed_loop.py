@@ -29,6 +29,7 @@ from runtime.errors import InputError, SettingsError
 from runtime.estimators.law_check import LawFit, law_fits, law_text
 from runtime.model.generated import GeneratedModel
 from runtime.motion.reference import Reference, of_record, reference_of, require_rate
+from runtime.observation.counts import REACH
 from runtime.observation.filters import States, decimated, filtered_states
 from runtime.observation.observation import decimated_torque, observation_from_states
 from runtime.observation.rows import Selection, select_rows
@@ -307,11 +308,13 @@ def slowest(speed: Array, samples: int) -> Array:
 
 
 def _usable(simulator: LoopSimulator, record: Record, keep: Array | None) -> Array | None:
-    """`keep`, and the samples whose torque is not at its limit."""
+    """`keep`, and the samples whose torque is not at its limit and whose positions are there or missing for a moment only."""
     bound = np.broadcast_to(np.asarray(simulator.law.saturation, dtype=float), (record.n,))
-    if not np.isfinite(bound).any():
+    if not np.isfinite(bound).any() and record.missing is None:
         return keep
     free: Array = np.abs(record.tau) <= CLIPPED * bound
+    if record.missing is not None:
+        free &= ~record.missing.near_gaps(round(REACH / 2 * record.rate), round(REACH * record.rate))[:, None]
     return free if keep is None else free & (keep if keep.ndim == 2 else keep[:, None])
 
 

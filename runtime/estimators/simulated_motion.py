@@ -72,12 +72,14 @@ def simulated_motion(loop: ClosedLoop, observation: Observation, X: Array) -> tu
 
 
 def _compared(loop: ClosedLoop, observation: Observation, runs: Sequence[SimulatedRun]) -> tuple[JointMotion, ...]:
-    q, every = [part.record.q for part in loop.parts], loop.simulator.controller.record_every
+    gaps = [False if part.record.missing is None else part.record.missing.at_joints() for part in loop.parts]
+    q = [np.where(missing, np.nan, part.record.q) for part, missing in zip(loop.parts, gaps, strict=True)]
+    every = loop.simulator.controller.record_every
     error = np.concatenate([run.q[: len(x)] - x for run, x in zip(runs, q, strict=True)])
-    moved = np.concatenate([x - x.mean(axis=0) for x in q])
+    moved = np.concatenate([x - np.nanmean(x, axis=0) for x in q])
     lag = np.concatenate([part.reference.q[::every][: len(x)] - x for part, x in zip(loop.parts, q, strict=True)])
     tau = loop.outputs(loop.torques(runs), observation)
-    rms, size, tracking = (np.sqrt(np.mean(x**2, axis=0)) for x in (error, moved, lag))
+    rms, size, tracking = (np.sqrt(np.nanmean(x**2, axis=0)) for x in (error, moved, lag))
     return tuple(
         JointMotion(
             str(label),

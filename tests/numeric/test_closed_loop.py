@@ -13,10 +13,10 @@ from campaign import campaign
 from runtime import InputError, Record, identify, load_model
 from runtime.errors import SettingsError
 from runtime.estimators import fixed_point as iteration
-from runtime.estimators.closed_loop import closed_loop, slips, slowest
+from runtime.estimators.closed_loop import closed_loop, loop_of, slips, slowest
 from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import estimate_of
-from runtime.estimators.simulated_motion import judged
+from runtime.estimators.simulated_motion import judged, simulated_motion
 from runtime.motion.reference import Reference, reference_of
 from runtime.motion.simulation import Simulator, parameters_of
 from runtime.observation.observation import observe
@@ -219,6 +219,19 @@ def test_slow_rows_around(arm, clean):
     assert sum(near.rows) < sum(alone.rows) - 50
     every = replace(study, rows=replace(study.rows, low_speed=0.0))
     assert closed_loop(model, [clean[0]], every, simulator, around=0.05).measured().rows == observe(model, clean[0], every).rows
+
+
+def test_gaps_of_positions_stay_out_of_the_loop(arm, clean):
+    """No rows near a gap, and the simulated motion is compared with measured positions alone, not with the straight line across the gap."""
+    model, study, simulator, truth, _ = arm
+    gap = ((clean[0].t > 1.0) & (clean[0].t < 1.4))[:, None] & [True, False]
+    record = replace(clean[0], q=np.where(gap, np.nan, np.round(clean[0].q / 1e-4) * 1e-4), missing=gap)
+    counted = replace(study, signals=replace(study.signals, reader="counts", step=1e-4))
+    loop = closed_loop(model, [record], counted, simulator, around=0.05)
+    selection, observation = loop.parts[0].selection, loop.measured()
+    assert not selection.mask[:, (selection.t > 0.99) & (selection.t < 1.41)].any() and len(observation.Y) > 200
+    apart = simulated_motion(loop_of(observation, "didim"), observation, truth)
+    assert max(one.rms for one in apart) < 1e-4, apart
 
 
 @pytest.mark.parametrize("method", SIMULATING)
