@@ -1,6 +1,7 @@
 """Peak memory and time per sample of `symgen identify` on a record larger than it should need: TX40, 5 kHz, read by blocks.
 
     python benchmarks/memory.py [--samples 10000000] [--small 100000] [--format npz|csv|parquet] [--reader lowpass|counts] [--rounds 3] [--folder DIR]
+        [--workers 2]
 
 The record is made by blocks in a temporary folder: sums of sines about the arm's limits of speed, torques of the parameters of the robot file with
 0.5 N m of noise; for the reader of counts, positions of an encoder of 20,000 lines a turn. Each identification is a process of its own (`symgen
@@ -8,6 +9,10 @@ identify tx40 study.yaml`): ru_maxrss of that process, its CPU time over the sam
 Rounds of the small record enclose the large one. The limit is 600 MB at 10 million samples; the whole-record identification of the small record
 (`stream: off`) stands beside it. Plain: what one writes by hand on an emitted module with records that fit: filters of the whole record, W by blocks
 of 65536 samples, each decimated by scipy column by column, lstsq of all rows; CPU time of the small record, from an .npz.
+
+With --workers instead: the large record by one process and by so many, in turn, on all cores: wall time, CPU time and peak memory of the process that
+asks and of the largest of the others, and whether all results agree in every byte. Wall time needs a quiet machine; beside it stands what the CPU times
+would give, the one process plus an equal share of the others.
 """
 
 # ruff: noqa: E402
@@ -55,8 +60,10 @@ try:
     main()
 except SystemExit as e:
     code = e.code
-usage = resource.getrusage(resource.RUSAGE_SELF)
-print(json.dumps({"code": code, "bytes": usage.ru_maxrss * 1024, "s": usage.ru_utime + usage.ru_stime}), file=sys.stderr)
+def used(who):
+    usage = resource.getrusage(who)
+    return {"bytes": usage.ru_maxrss * 1024, "s": usage.ru_utime + usage.ru_stime}
+print(json.dumps({"code": code, **used(resource.RUSAGE_SELF), "others": used(resource.RUSAGE_CHILDREN)}), file=sys.stderr)
 """
 
 
@@ -136,20 +143,38 @@ def plain(model: Any, record: Path) -> tuple[float, Array]:
     return time.process_time() - start, X
 
 
-def identified(record: Path, stream: int | str, reader: str = "lowpass") -> dict[str, Any]:
-    """Peak bytes and CPU seconds of an identification in a process of its own, and its estimate."""
+def identified(record: Path, stream: int | str, reader: str = "lowpass", workers: int = 1) -> dict[str, Any]:
+    """Peak bytes, CPU and wall seconds of an identification in a process of its own, and its estimate."""
     columns = {"columns": {"q": ["q"], "tau": ["tau"]}} if record.suffix == ".npz" else {}
     study = record.with_suffix(".yaml")
     signals = {} if reader == "lowpass" else {"signals": {"reader": reader, "step": STEP, "side": "joint"}}
     settings = {"record": {"files": [record.name], "rate": RATE, **columns}, "stream": stream, **signals}
     study.write_text(json.dumps(settings))  # JSON is YAML
-    done = subprocess.run(
-        [sys.executable, "-c", CHILD, "identify", "tx40", str(study), "--json"], capture_output=True, text=True, check=False
-    )
+    start, command = time.perf_counter(), ["identify", "tx40", str(study), "--json", "--workers", str(workers)]
+    done = subprocess.run([sys.executable, "-c", CHILD, *command], capture_output=True, text=True, check=False)
+    wall = time.perf_counter() - start
     lines = done.stderr.strip().splitlines()
     if done.returncode or not lines or not lines[-1].startswith("{"):
         raise SystemExit(f"identification failed:\n{done.stderr[-2000:]}")
-    return {**json.loads(lines[-1]), "estimate": json.loads(done.stdout)}
+    return {**json.loads(lines[-1]), "wall": wall, "text": done.stdout, "estimate": json.loads(done.stdout)}
+
+
+def by_workers(record: Path, reader: str, workers: int, rounds: int) -> None:
+    """Wall time of one process over that of several, and their memory."""
+    done = [(identified(record, BLOCK, reader), identified(record, BLOCK, reader, workers)) for _ in range(rounds)]
+    for count, runs in zip((1, workers), zip(*done, strict=True), strict=True):
+        wall, cpu, others = (
+            ", ".join(f"{x:.1f}" for x in row) for row in zip(*((r["wall"], r["s"], r["others"]["s"]) for r in runs), strict=True)
+        )
+        memory = max(r["bytes"] for r in runs) / 1e6, max(r["others"]["bytes"] for r in runs) / 1e6
+        print(
+            f"workers {count}: wall {wall} s, CPU {cpu} s, others {others} s; peak {memory[0]:.0f} MB, largest other process {memory[1]:.0f} MB"
+        )
+    ratios = [one["wall"] / several["wall"] for one, several in done]
+    predicted = [(a["s"] + a["others"]["s"]) / (b["s"] + b["others"]["s"] / workers) for a, b in done]
+    for name, row in (("wall", ratios), ("by CPU time", predicted)):
+        print(f"one over {workers}, {name}: {statistics.median(row):.2f} [{min(row):.2f}, {max(row):.2f}]")
+    print(f"same bytes: {len({run['text'] for pair in done for run in pair}) == 1}, load at the end {os.getloadavg()[0]:.1f}")
 
 
 def main() -> None:
@@ -159,15 +184,19 @@ def main() -> None:
     parser.add_argument("--format", choices=WRITERS, default="npz")
     parser.add_argument("--reader", choices=("lowpass", "counts"), default="lowpass")
     parser.add_argument("--rounds", type=int, default=3, help="of the small record")
+    parser.add_argument("--workers", type=int, default=1, help="compare so many processes with one")
     parser.add_argument("--folder", type=Path, help="where the temporary folder is made")
     arguments = parser.parse_args()
-    if hasattr(os, "sched_setaffinity"):
+    if hasattr(os, "sched_setaffinity") and arguments.workers == 1:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     model: Any = load_model(ROOT / "generated" / "tx40.py")
-    print(f"{platform.platform()}, numpy {np.__version__}, load {os.getloadavg()[0]:.1f}, one core, {arguments.format}, {arguments.reader}")
+    print(f"{platform.platform()}, numpy {np.__version__}, load {os.getloadavg()[0]:.1f}, {arguments.format}, {arguments.reader}")
     reader = arguments.reader
     with TemporaryDirectory(dir=arguments.folder) as folder:
         write = WRITERS[arguments.format]
+        if arguments.workers > 1:
+            by_workers(write(model, arguments.samples, Path(folder), reader), reader, arguments.workers, arguments.rounds)
+            return
         start, small, large = (write(model, samples, Path(folder), reader) for samples in (START, arguments.small, arguments.samples))
         print(f"record of {arguments.samples} samples: {large.stat().st_size / 1e6:.0f} MB in {large.suffix}")
         rest = statistics.median(identified(start, BLOCK, reader)["s"] for _ in range(arguments.rounds))

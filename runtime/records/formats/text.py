@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from io import StringIO, TextIOWrapper
+from io import TextIOWrapper
 from itertools import islice
 
 import numpy as np
@@ -51,9 +51,13 @@ class TextTable(Table):
 
     def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
         indices = [self.names.index(name) for name in names]
+        if self._numbers is not None:
+            held = self._numbers[:stop]
+            yield from ([held[a : a + size, i] for i in indices] for a in range(start, len(held), size))
+            return
         waiting, done = Queue(), start
         try:
-            for numbers in self._read(start, stop) if self._numbers is None else [self._numbers[start:stop]]:
+            for numbers in self._read(start, stop):
                 waiting.put(numbers[:, indices])
                 while waiting.count >= size:
                     yield list(waiting.take(size).T)
@@ -127,7 +131,7 @@ class TextTable(Table):
 
     def _plain(self, lines: str) -> Array:
         quote = '"' if '"' in lines else None
-        numbers = np.loadtxt(StringIO(lines), delimiter=self.delimiter, ndmin=2, comments=None, quotechar=quote)
+        numbers = np.loadtxt(lines.split("\n"), delimiter=self.delimiter, ndmin=2, comments=None, quotechar=quote)
         if numbers.shape[1] != len(self.names):
             raise ValueError("columns")
         return numbers
@@ -159,7 +163,7 @@ class TextTable(Table):
                 return None
             text = _one_newline(whole.decode("utf-8-sig")).lstrip()
             lines = text.partition("\n")[2] if self.has_header else text
-            if "#" in text or self.source.decimal != "." or not lines.strip():
+            if "#" in text or self.source.decimal != "." or not lines or lines.isspace():
                 return None
             return self._loaded(lines)
         except ValueError:  # the file is read again by lines, which tells where
