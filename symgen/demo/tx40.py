@@ -167,7 +167,7 @@ def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], No
         progress(label)
         combinations[label] = resolution(changed, **settings)
     progress("other treatments of the record")
-    variants = {"as in this report": result.essential, **_variants(replace(prepared, study=study))}
+    variants = {"as in this report": result.essential, **_variants(replace(prepared, model=runs, study=study))}
     return Demonstration(prepared, result, main, curve, torque, combinations, variants)
 
 
