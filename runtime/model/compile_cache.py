@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 
 FLAGS = ("-std=c11", "-O2", "-ftree-vectorize", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-shared", "-fPIC")
 LIBRARIES = ("-lm",)
-WIDTHS = ("avx512f", "avx2")  # of vectors on x86-64, widest first
+WIDTHS = {"avx512f": 8, "avx2": 4}  # of vectors on x86-64, widest first, and how many doubles they hold
 VECTOR_SINES = "-fveclib=libmvec"
 PAIRS = (
     "--param=max-combine-insns=2"  # of gcc: merging three and four instructions takes a third of its time here, and makes nothing faster
@@ -118,11 +118,12 @@ def _compiled(command: Sequence[str], flags: Sequence[str], path: Path, text: by
 
 
 def _width() -> tuple[str, ...]:
-    """Macro WIDTH: the widest vectors of this processor, as the C files ask for one width instead of several."""
+    """Macros WIDTH and DOUBLES: the widest vectors of this processor and their numbers, as the C files ask for one width instead of several."""
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return ()
     known = _cpuinfo("flags").split()
-    return (f'-DWIDTH="{next((width for width in WIDTHS if width in known), "sse2")}"',)
+    width = next((width for width in WIDTHS if width in known), "sse2")
+    return f'-DWIDTH="{width}"', f"-DDOUBLES={WIDTHS.get(width, 2)}"
 
 
 def _own_options(command: Sequence[str]) -> tuple[str, ...]:

@@ -228,7 +228,7 @@ def test_subnormal_numbers_survive():
 
 
 @pytest.mark.parametrize("compiler", [c for c in ("gcc", "clang") if shutil.which(c)])
-@pytest.mark.parametrize("variant", ["", *(pytest.param(flag, marks=campaign) for flag in ("-DPORTABLE", "-DSCALAR"))])
+@pytest.mark.parametrize("variant", ["", *(pytest.param(flag, marks=campaign) for flag in ("-DPORTABLE", "-DSCALAR", "-DDOUBLES=8"))])
 def test_no_warnings(compiler, variant, tmp_path):
     """As it is compiled, without the parts for one processor, and as a compiler without vector types reads it."""
     flags = [*fused.FUSED_FLAGS, *WARNINGS, *([variant] if variant else [])]
