@@ -29,7 +29,7 @@ from runtime.observation.by_blocks import BlockTask, Layout, instants_of, of_pie
 from runtime.observation.filters import States, decimated, filtered_states, median_filtered
 from runtime.observation.pieces import Piece, pieces
 from runtime.observation.regressor_signals import decimated_columns
-from runtime.observation.rows import Selection, select_rows
+from runtime.observation.rows import Selection, nothing_left, select_rows
 from runtime.observation.segments import HeldRows, SegmentFactors, Window
 from runtime.observation.states import certain_rows, observed_states
 from runtime.observation.system import (
@@ -162,6 +162,8 @@ def observation_from_states(
     store = decimated_columns(model, window, selection.factor, selection.signals.decimate, constants or {}, numbers)
     selection = certain(model, states, selection, constants)
     mask = selection.mask.ravel()
+    if not mask.any():
+        raise InputError(nothing_left(selection.dropped, K), file=", ".join(files or ()) or None)
     return Observation(
         W=np.compress(mask, store.reshape(len(names), n * K), axis=1).T,
         Y=torque.ravel()[mask],

@@ -17,7 +17,13 @@ from runtime.settings.study import Rows, Signals
 
 Array = np.ndarray
 
-LEAVES_OUT = {"trim": "rows.trim", "low_speed": "rows.low_speed", "mask": "the choice of samples", "missing": "positions that are missing"}
+LEAVES_OUT = {
+    "trim": "rows.trim",
+    "low_speed": "rows.low_speed",
+    "mask": "the choice of samples",
+    "missing": "positions that are missing",
+    "direction": "an uncertain direction of dry friction",
+}
 
 
 @dataclass(frozen=True, eq=False)

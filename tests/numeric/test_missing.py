@@ -108,6 +108,12 @@ def test_arrays():
             observe(planar, source, replace(STUDY, signals=replace(SIGNALS, reader="lowpass")))
     with pytest.raises(InputError, match="encoder 2: no sample is known"):
         observe(planar, replace(RECORD, missing=MISSING | [False, True]), STUDY)
+    rare = replace(RECORD, missing=MISSING | ((np.arange(N) % 500 > 0)[:, None] & [True, False]))
+    for source in (rare, RecordStream(rare, 500)):
+        with pytest.raises(
+            InputError, match=r"none of its 200 rows per joint is used: rows.trim leaves out 40, positions that are missing leaves? out"
+        ):
+            observe(planar, source, STUDY)
 
 
 def test_short_gaps_are_filled_and_long_ones_left_out():
