@@ -100,6 +100,16 @@ def test_records_of_one_name_stay_apart(model):
 
 
 @campaign
+@pytest.mark.parametrize("long", [0, 10**9])
+def test_long_records_are_sampled_by_the_model_of_runs(model, monkeypatch, long):
+    """That model is asked for once, and only then; what is sampled is the same."""
+    asked = []
+    monkeypatch.setattr("runtime.identification.assessment.LONG", long)
+    result = assess(model, measured(model, 5), STUDY, runs=lambda: asked.append(1) or model)
+    assert len(asked) == (long == 0) and result.advice is not None and result.resolution is not None
+
+
+@campaign
 def test_report_writes_what_the_verbs_write(model, tmp_path):
     result = assess(model, measured(model, 5), STUDY, encoder=(1e-4,))
     assert result.missing == () and result.feasibility is not None and len(result.friction) == 2
