@@ -113,7 +113,7 @@ def test_arrays():
         with pytest.raises(
             InputError, match=r"none of its 200 rows per joint is used: rows.trim leaves out 40, positions that are missing leaves? out"
         ):
-            observe(planar, source, STUDY)
+            observe(planar, source, replace(STUDY, signals=replace(SIGNALS, step=STEP)))
 
 
 def test_short_gaps_are_filled_and_long_ones_left_out():
