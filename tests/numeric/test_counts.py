@@ -217,7 +217,7 @@ def test_counts_that_wrap_are_unwrapped_and_told():
     np.testing.assert_allclose(moved_by, moved_by[0], atol=1e-4)
 
 
-@pytest.mark.parametrize("bits", [16, 32])
+@pytest.mark.parametrize("bits", [16, pytest.param(32, marks=campaign)])
 def test_wraps_by_blocks_as_a_whole(planar, record, monkeypatch, bits):
     """Counts that wrap within a stretch, within its margins and while samples are missing: the numbers of the whole record, and its sentences."""
     monkeypatch.setattr("runtime.observation.counts.STRETCH", 1500)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import polars
 import pytest
+from campaign import campaign
 from planar_data import motion
 from scipy.io import savemat
 from typer.testing import CliRunner
@@ -135,7 +136,7 @@ def test_short_gaps_are_filled_and_long_ones_left_out():
     assert "at most 600 in a row (0.6 s); where the counts around a gap" in observation.findings[-1]
 
 
-@pytest.mark.parametrize("margin", [1000, 100])
+@pytest.mark.parametrize("margin", [pytest.param(1000, marks=campaign), 100])
 def test_by_blocks_as_a_whole(monkeypatch, margin):
     """Gaps across blocks and stretches, with the small margin one that holds a whole stretch and its margins."""
     monkeypatch.setattr("runtime.observation.counts.STRETCH", 1500 if margin == 1000 else 300)
@@ -203,7 +204,7 @@ def test_motor_side_of_a_file(tmp_path):
     np.testing.assert_allclose(motor[~MISSING[:200]], RECORD.q[:200][~MISSING[:200]], atol=1e-12)
 
 
-@pytest.mark.parametrize("steps", [2, 8])
+@pytest.mark.parametrize("steps", [2, pytest.param(8, marks=campaign)])
 def test_cestac_of_a_record_with_gaps(steps):
     """Law phase, from draws of the posterior and from the positions: rows of the long gap stay out, estimates near the whole record's."""
     asked = CestacSettings(delta=(steps * STEP,), runs=2, columns="all", rounding="phase")
