@@ -53,7 +53,7 @@ STEP = 2 * np.pi / 20000  # rad, of the encoders for the reader of counts
 Array = np.ndarray[Any, Any]
 
 CHILD = """
-import json, resource, sys
+import json, os, resource, sys
 sys.argv[0] = "symgen"
 from symgen.cli.main import main
 try:
@@ -63,7 +63,10 @@ except SystemExit as e:
 def used(who):
     usage = resource.getrusage(who)
     return {"bytes": usage.ru_maxrss * 1024, "s": usage.ru_utime + usage.ru_stime}
-print(json.dumps({"code": code, **used(resource.RUSAGE_SELF), "others": used(resource.RUSAGE_CHILDREN)}), file=sys.stderr)
+own = used(resource.RUSAGE_SELF)
+if os.path.exists("/proc/self/status"):  # ru_maxrss begins with that of the process that started this one
+    own["bytes"] = next(1024 * int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmHWM"))
+print(json.dumps({"code": code, **own, "others": used(resource.RUSAGE_CHILDREN)}), file=sys.stderr)
 """
 
 

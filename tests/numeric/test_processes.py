@@ -11,7 +11,7 @@ import pytest
 from campaign import campaign
 
 from runtime.errors import InputError
-from runtime.parallel import BLAS_THREADS, results
+from runtime.parallel import BLAS_THREADS, in_order, results
 
 
 def threads(context, key):
@@ -31,6 +31,12 @@ def dying_once(folder, key):
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return key
+
+
+def late(context, key):
+    """The first key takes longest."""
+    time.sleep(0 if key else context)
+    return key**2
 
 
 def always_dying(context, key):
@@ -69,6 +75,20 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
 def waiting(context, key):
     time.sleep(key)
     return os.getpid()
+
+
+@campaign
+def test_what_still_runs_ends_when_the_caller_stops():
+    """As Ctrl-C does."""
+    finished, start = results(waiting, None, [0.0, 60.0], 2), time.monotonic()
+    next(finished)
+    finished.close()
+    assert time.monotonic() - start < 30
+
+
+@campaign
+def test_results_in_the_order_of_the_keys():
+    assert list(in_order(late, 1.0, range(4), 2)) == [0, 1, 4, 9]
 
 
 def test_here_in_order():
