@@ -13,7 +13,6 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
@@ -30,6 +29,7 @@ STYLE: Any = {
     "text.parse_math": False,  # names of joints are shown as they are
     "axes.spines.top": False,
     "axes.spines.right": False,
+    "axes.grid": True,
     "axes.titley": 1.0,  # not sought
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.5,
@@ -100,14 +100,13 @@ def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
         for ax, joint in zip(axes, joints, strict=False):
             deviation = float(np.std(joint.error)) or 1.0
             x = np.linspace(-4, 4, 161)
-            density, edges = np.histogram(joint.error / deviation, bins=40, range=(-4, 4), density=True)
-            bars = [[(a, 0), (a, height), (b, height), (b, 0)] for a, b, height in zip(edges[:-1], edges[1:], density, strict=True)]
-            ax.add_collection(PolyCollection(bars, facecolor=SKY, edgecolor="white", linewidth=0.3))
+            ax.hist(
+                joint.error / deviation, bins=np.linspace(-4, 4, 41).tolist(), density=True, color=SKY, edgecolor="white", linewidth=0.3
+            )
             ax.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color=BLACK, linewidth=1.2)
             ax.set_title(f"joint {joint.joint}, deviation {deviation:.3g} {unit}", fontsize=9)
             ax.set_xlabel("residual / deviation")
             ax.set_yticks([])
-            ax.set_ylim(bottom=0)
     return figure
 
 
@@ -123,7 +122,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
     e = np.array([level.e for level in levels]).reshape(len(levels), -1)
     coloured = [name for name in names if name in result.names] or _sharpest(result)
     with mpl.rc_context(STYLE):
-        figure, (ax,) = panels_figure(1, 1, (6.4, 4.4), right=0.45)
+        figure, (ax,) = panels_figure(1, 1, (6.4, 4.4), right=0.45, below=0.25)
         for name in result.deciding:
             if name not in coloured:
                 ax.plot(delta, _drawn(e[:, result.names.index(name)]), color="#C8C8C8", linewidth=0.8, zorder=1)
@@ -144,8 +143,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
             ax.annotate(
                 f"{limit:g} %", (1.0, limit), xycoords=("axes fraction", "data"), xytext=(3, 0), textcoords="offset points", va="center"
             )
-        ax.set_xticks(delta, [level.level.label.replace("2*pi/", "2π/") for level in levels])
-        ax.tick_params("x", labelrotation=30, labelsize=8)
+        ax.set_xticks(delta, [level.level.label.replace("2*pi/", "2π/") for level in levels], rotation=30, ha="right", fontsize=8)
         ax.set_xlabel(f"resolution Δ, {unit}")
         ax.set_ylabel("%e: change of the estimate, %")
         shared_legend(figure, [ax], 4, size=8)
@@ -184,15 +182,17 @@ def _drawn(values: np.ndarray) -> np.ndarray:
 
 
 def panels_figure(
-    rows: int, columns: int, size: tuple[float, float], *, used: int | None = None, right: float = 0.12
+    rows: int, columns: int, size: tuple[float, float], *, used: int | None = None, right: float = 0.12, below: float = 0.0
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of `size`, inch, and its panels row by row: all of the grid, or the first `used`.
+    """A figure of `size`, inch, and its panels row by row; those beyond `used` are blank.
 
-    right : room for what stands to the right of a panel, inch.
+    right, below : room for what stands to the right of a panel, and below it besides a line of ticks and a label, inch.
     """
-    figure = empty_figure(size, layout=PanelLayout(right=right))
-    grid = figure.add_gridspec(rows, columns)
-    return figure, [figure.add_subplot(grid[k // columns, k % columns]) for k in range(rows * columns if used is None else used)]
+    figure = empty_figure(size, layout=PanelLayout(right=right, below=below))
+    axes = list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
+    for ax in axes[used:] if used is not None else ():
+        ax.set_visible(False)
+    return figure, axes
 
 
 def shared_legend(figure: Figure, panels: Sequence[Axes], columns: int, *, size: float = STYLE["font.size"]) -> None:

@@ -59,7 +59,6 @@ def operational_space_figure(space: OperationalSpace, shape: tuple[int, int], ax
             ax.set_xlabel(labels[0])
             ax.set_ylabel(labels[1])
             ax.set_aspect("equal")
-            ax.grid(True)
     return figure
 
 

@@ -31,7 +31,7 @@ def readers_figure(by_positions: Cestac, by_counts: Cestac, names: Sequence[str]
     i = by_positions.names.index(key)
     unit = by_positions.reference.units.get(key, "").replace("**", "^").replace("*", " ")
     with mpl.rc_context(STYLE):
-        figure, (left, right) = panels_figure(1, 2, (9.6, 4.2), right=0.35)
+        figure, (left, right) = panels_figure(1, 2, (9.6, 4.2), right=0.35, below=0.25)
         for result, (label, color, marker) in zip((by_positions, by_counts), READ, strict=True):
             delta, rms, largest = errors(result, names)
             left.plot(delta, rms, color=color, marker=marker, markersize=5, linewidth=1.6, label=label)
@@ -61,8 +61,9 @@ def readers_figure(by_positions: Cestac, by_counts: Cestac, names: Sequence[str]
         delta = errors(by_positions, names)[0]
         for ax in (left, right):
             logarithmic(ax, "x")
-            ax.set_xticks(delta, [level.level.label.replace("2*pi/", "2π/") for level in by_positions.levels])
-            ax.tick_params("x", labelrotation=30, labelsize=8)
+            ax.set_xticks(
+                delta, [level.level.label.replace("2*pi/", "2π/") for level in by_positions.levels], rotation=30, ha="right", fontsize=8
+            )
             ax.set_xlabel("step of every encoder")
         shared_legend(figure, [left], 2, size=9)
     return figure
