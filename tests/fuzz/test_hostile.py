@@ -48,7 +48,7 @@ YAML = {
     "nul": ("a: \x00\n", "not YAML"),
     "surrogate": ("a: \ud800\n", "UTF-8"),
     "long text": ("a: " + "x" * 3_000_000 + "\n", ""),
-    "many values": ("a: [" + "1," * 150_000 + "1]\n", ""),
+    "many values": ("a: [" + "1," * 50_000 + "1]\n", ""),
     "utf-16": (b"\xff\xfe" + "symgen: 1\n".encode("utf-16-le"), ""),
 }
 
@@ -155,7 +155,7 @@ def test_members_that_overlap_and_names_that_climb(reader, tmp_path):
 
 @campaign
 def test_gzip_bombs(reader):
-    refused(reader, "csv.gz", gzip.compress(b"1," * 150_000_000, 1), "unpacks to")
+    refused(reader, "csv.gz", gzip.compress(b"1," * 50_000_000, 1), "unpacks to")
     for unit in (b"\n", b"1,", b"12\n", b"\x00"):
         refused(reader, "csv.gz", gzip.compress(unit * (30_000_000 // len(unit)), 1), "case.csv.gz")
 
