@@ -100,9 +100,7 @@ def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
         for ax, joint in zip(axes, joints, strict=False):
             deviation = float(np.std(joint.error)) or 1.0
             x = np.linspace(-4, 4, 161)
-            ax.hist(
-                joint.error / deviation, bins=np.linspace(-4, 4, 41).tolist(), density=True, color=SKY, edgecolor="white", linewidth=0.3
-            )
+            ax.stairs(*np.histogram(joint.error / deviation, bins=40, range=(-4, 4), density=True), fill=True, color=SKY, zorder=2)
             ax.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color=BLACK, linewidth=1.2)
             ax.set_title(f"joint {joint.joint}, deviation {deviation:.3g} {unit}", fontsize=9)
             ax.set_xlabel("residual / deviation")
