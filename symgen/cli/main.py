@@ -55,9 +55,8 @@ class Verbs(TyperGroup):
         super().format_help(ctx, formatter)
 
 
-ALLOCATIONS = (
-    100_000  # between two searches for unreachable objects: modules and figures are many objects that stay, a tenth of the time of a report
-)
+ALLOCATIONS = 100_000
+"""New objects between two searches for unreachable ones. Most objects of modules and figures stay: seeking among them takes a tenth of a report."""
 
 app = typer.Typer(
     cls=Verbs, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None

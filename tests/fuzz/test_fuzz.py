@@ -10,7 +10,7 @@ from fuzz.formats import FORMATS
 from fuzz.harness import Reader, case, run
 
 CORPUS = Path(__file__).parent / "corpus"
-CASES = 120  # of all formats in the default run
+CASES = 200  # of all formats in the default run
 MORE = 40000 if FULL else 3000  # of a campaign: a third of the fixed seed, the others of one that was never tried
 
 

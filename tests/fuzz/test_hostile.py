@@ -48,7 +48,7 @@ YAML = {
     "nul": ("a: \x00\n", "not YAML"),
     "surrogate": ("a: \ud800\n", "UTF-8"),
     "long text": ("a: " + "x" * 3_000_000 + "\n", ""),
-    "many values": ("a: [" + "1," * 50_000 + "1]\n", ""),
+    "many values": ("a: [" + "1," * 150_000 + "1]\n", ""),
     "utf-16": (b"\xff\xfe" + "symgen: 1\n".encode("utf-16-le"), ""),
 }
 
