@@ -16,7 +16,7 @@ from symgen.emit.header import tables
 from symgen.emit.models import MODELS
 from symgen.emit.printers import Text
 from symgen.emit.python_target import arguments, constants_of, context, listed
-from symgen.emit.render import laid_out
+from symgen.emit.render import python_module
 from symgen.emit.spec import Function, ModuleSpec, module_spec
 from symgen.errors import SymgenError
 from symgen.regroup.formula import Python
@@ -55,7 +55,7 @@ def render(regrouping: Regrouping, *, command: str | None = None) -> str:
         "passive_joints": ["q", "qd", "qdd", *values["passive_constants"]],
         "jacobian": ["q", *constants_of(robot, functions["frame_poses"].constants, values["path_constants"])],
     }
-    return laid_out(
+    return python_module(
         "casadi.py",
         {
             **values,
@@ -68,6 +68,8 @@ def render(regrouping: Regrouping, *, command: str | None = None) -> str:
             "of_frame": listed(takes["jacobian"]),
             "passive_constants": listed(takes["passive_joints"][3:]),
         },
+        robot.constants,
+        {f.model.result for f in functions.values()},
     )
 
 

@@ -9,7 +9,7 @@ from symgen.derive.loops import close
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.emit.header import literal, tables
 from symgen.emit.python_target import arguments, context, element_lines
-from symgen.emit.render import laid_out
+from symgen.emit.render import python_module
 from symgen.emit.spec import WIDTH, Function, ModuleSpec
 from symgen.regroup.formula import Python
 
@@ -23,7 +23,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     start = [close(robot).start[j] for j in close(robot).independent] if spec.tied else []
     units = units_of_joints(robot) if spec.tied else ()
     mode = f"_MODE = {loop_system(robot).mode()}  # sign of det J_u in the assembly mode of _START" if spec.tied else ""
-    return laid_out(
+    return python_module(
         "module.py",
         {
             **context(spec, command, LANGUAGE, "np.ndarray"),
@@ -37,6 +37,8 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "evaluated": {name: list(_evaluation(spec, f)) for name, f in spec.functions.items()},
             "blocks": [_block(spec, f) for f in spec.functions.values() if f.sections],
         },
+        robot.constants,
+        {f.model.result for f in spec.functions.values()},
     )
 
 

@@ -13,7 +13,6 @@ from fractions import Fraction
 from typing import ClassVar
 
 from symgen.derive.graph import ADD, CONST, COS, INV, MUL, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
-from symgen.errors import SymgenError
 
 CALLS = {COS: "np.cos", SIN: "np.sin", SIGN: "np.sign", SQRT: "np.sqrt"}
 MAX_NAME = 60
@@ -97,8 +96,8 @@ class Text:
                 self._call(node, node.hint or self._made_of(node))
 
     def _call(self, node: Node, name: str) -> None:
-        if name in self.taken:
-            raise SymgenError(f"two quantities would be called {name}; rename the constant or parameter of that name in the robot file")
+        while name in self.taken:  # a constant or parameter of the robot file may be called S2
+            name += "b"
         self.taken.add(name)
         self.called[node.index] = name
 

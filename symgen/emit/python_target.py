@@ -12,19 +12,14 @@ from symgen.description.robot import FIXED, Robot
 from symgen.emit.header import header, packed, plain
 from symgen.emit.models import MODELS
 from symgen.emit.spec import WIDTH, Function, ModuleSpec, unpacked
-from symgen.errors import SymgenError
 from symgen.regroup.formula import Python
 from symgen.regroup.regrouping import sign_conditions
 from symgen.version import VERSION
-
-OWN = {"states", "GAM", "T", "rates", "offsets"}  # what the templates assign before they pass constants on
 
 
 def context(spec: ModuleSpec, command: str | None, language: Python, array: str, quote: str = "") -> dict[str, Any]:
     """Values for the template of a Python module; `array` is the hint of its arrays, between `quote` where it is no class."""
     robot, regrouping, closure = spec.robot, spec.regrouping, close(spec.robot)
-    if clash := sorted(robot.constants.keys() & OWN):
-        raise SymgenError(f"constant {', '.join(clash)}: the module calls something else so; rename it in the robot file")
     formulas = [(b.name, b.formula) for b in regrouping.base if b.name != b.own]
     read = {name for b in regrouping.base for name in b.combination}
     takes = {name: arguments(f) for name, f in spec.functions.items()}

@@ -19,7 +19,7 @@ from symgen.emit.header import literal, tables
 from symgen.emit.models import LOCALS, STATES, Entry, Model, Values
 from symgen.emit.printers import Section, Text
 from symgen.emit.python_target import context
-from symgen.emit.render import laid_out
+from symgen.emit.render import python_module
 from symgen.emit.spec import ModuleSpec, aligned
 from symgen.errors import SymgenError
 from symgen.regroup.formula import Python
@@ -87,7 +87,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     blocks = {name: _block(regrouping, spec.functions[name].model, entries) for name, entries in values.items()}
     base = context(spec, command, LANGUAGE, "Array", '"')
     formulas: Sequence[str] = base["formulas"]
-    return laid_out(
+    return python_module(
         "xp.py",
         {
             **base,
@@ -99,6 +99,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "needs_zero": any("zero" in line for line in formulas),
             "needs_sign": any("_sign(" in block.text for block in blocks.values()),
         },
+        spec.robot.constants,
     )
 
 
