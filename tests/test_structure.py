@@ -42,9 +42,9 @@ ONLY_IN = {  # library: files and folders that may import it
     "rosbags": ("runtime/records/formats/bags.py",),
     "clarabel": ("runtime/estimators/semidefinite.py",),
     "array_api_compat": ("generated/",),
-    "dask": ("runtime/parallel.py",),
-    "distributed": ("runtime/parallel.py",),
-    "threadpoolctl": ("runtime/parallel.py",),
+    "dask": ("runtime/cluster.py",),
+    "distributed": ("runtime/cluster.py",),
+    "threadpoolctl": ("runtime/blas.py",),
     "scipy": ("runtime/",),
 }
 LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be mended, then empty

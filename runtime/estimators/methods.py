@@ -19,6 +19,7 @@ from runtime.observation.observation import observe
 from runtime.observation.position_errors import with_errors
 from runtime.observation.segments import Window
 from runtime.observation.system import Observation, stack
+from runtime.parallel import Workers
 from runtime.records.record import Record
 from runtime.records.stream import Stream
 from runtime.settings.study import EstimateSettings, Study
@@ -182,7 +183,7 @@ def observed(
     *,
     windows: Sequence[Window] | None = None,
     simulator: LoopSimulator | None = None,
-    workers: int = 1,
+    workers: int | Workers = 1,
 ) -> Observation:
     """The Observation that the method of the study needs: with errors of its columns for tls, with the closed loop for those that simulate it.
 

@@ -71,7 +71,7 @@ def excite(
     symbolic : str, Path or module, optional
         CasADi model of the same robot; default: the file beside that of `model`.
     workers : int
-        Processes, 0 for this one; results do not depend on it.
+        Processes, this one among them; results do not depend on it.
     progress : callable, optional
         Called after each start with the number done and their total.
 

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from runtime.blas import single_threaded
 from runtime.errors import InputError
 from runtime.identification.identification import identify
 from runtime.identification.parameter_sets import ORDER
@@ -25,7 +26,6 @@ from runtime.identification.plausibility.samples import samples_of
 from runtime.identification.result import Identification
 from runtime.model.generated import GeneratedModel
 from runtime.observation.observation import observe
-from runtime.parallel import single_threaded
 from runtime.progress import at
 from runtime.records.reading import read_records
 from runtime.records.record import Record

@@ -247,9 +247,9 @@ def identify_fleet(
     files : function of Identification and Path to mapping, optional
         What makes the contents of a job's folder, such as `runtime.reporting.files.identification_files`; a function of a module.
     workers : int
-        Processes; 0: this one. The results do not depend on it.
+        Processes, this one among them. The results do not depend on it.
     scheduler : str, optional
-        Address of a Dask cluster that works instead (`runtime.parallel`).
+        Address of a Dask cluster that works instead (`runtime.cluster`).
     finished : function of Finished, int, int
         Called after each job with what it gave, the number of jobs done and their total.
 

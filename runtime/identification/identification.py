@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from runtime.blas import single_threaded
 from runtime.errors import InputError
 from runtime.estimators.closed_loop import LoopSimulator
 from runtime.estimators.essential import essential_of
@@ -30,7 +31,7 @@ from runtime.identification.validation import CrossValidation, cross_validation,
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import physical_model
 from runtime.observation.system import halves
-from runtime.parallel import single_threaded
+from runtime.parallel import Workers
 from runtime.progress import at
 from runtime.records.provenance import origin, record_names
 from runtime.records.reading_by_blocks import records_or_streams
@@ -56,7 +57,7 @@ def identify(
     friction: bool = False,
     variants: GeneratedModel | None = None,
     plausible: bool | None = None,
-    workers: int = 1,
+    workers: int | Workers = 1,
     provenance: Mapping[str, Any] | None = None,
 ) -> Identification:
     """Parameters of a robot from its records, and how far to trust them.
@@ -81,8 +82,8 @@ def identify(
         The module of `symgen.variants`: other tables of frames and directions of gravity are tried on the records.
     plausible : bool, optional
         Whether record, study and robot file suit each other (`runtime.plausibility`); default: where `variants` is given.
-    workers : int, optional
-        Processes that read and filter long records by blocks; 1: this one. The results do not depend on it in any bit; a record in memory, or of one
+    workers : int or Workers, optional
+        Processes, this one among them, that read and filter long records by blocks. The results do not depend on it in any bit; a record in memory, or of one
         piece, takes one process.
     provenance : mapping, optional
         What else reproduces the result; names of the records, hashes and versions are added.
@@ -102,8 +103,6 @@ def identify(
     simulator = simulator or simulator_of(model, study)
     if further is None:
         further = records_or_streams(study.validate.record, model, study.stream, missing=study.signals.admits_missing)
-    if workers < 1:
-        raise InputError(f"{workers} workers; expected 1, this process, or more")
     observed = partial(method_observation, model, study=study, workers=workers)
     observation = observed(records, simulator=simulator)
     at("least squares, essential parameters")

@@ -6,12 +6,12 @@ ends, instants and rows are those of `runtime.observation.observation.observe` o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -36,14 +36,12 @@ from runtime.observation.streaming_filters import (
     position_stage,
     velocity_stage,
 )
-from runtime.parallel import in_order
 from runtime.records.missing import COUNTS, Missing, require_positions
 from runtime.records.stream import Queue, Stream, recut
 from runtime.settings.study import Signals, Study
 
 Array = np.ndarray
 Block = TypeVar("Block", bound=tuple[Array, ...])
-R = TypeVar("R")
 
 EVALUATED = 8192  # samples of the regressor at a time
 SHOWN = 4096  # instants of every record whose rows are kept for figures
@@ -56,7 +54,7 @@ class BlockTask:
     Attributes
     ----------
     model : GeneratedModel or ModelText
-        Emitted module, or its text for other processes.
+        Emitted module; its text in other processes.
     streams : tuple of Stream
         The records.
     study : Study
@@ -88,6 +86,10 @@ class BlockTask:
     def entries(self) -> Entries:
         """Where its regressor is not zero."""
         return distinct_entries(self.loaded, self.constants)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For other processes: the model as text, nothing of what was computed from it."""
+        return {**{f.name: getattr(self, f.name) for f in fields(self)}, "model": text_of(self.loaded)}
 
     @property
     def columns(self) -> list[Array]:
@@ -286,13 +288,6 @@ def piece_rows(task: BlockTask, piece: Piece) -> tuple[list[tuple[Array, Array, 
     if factors is not None:
         factors.reduce()
     return blocks, factors
-
-
-def of_pieces(function: Callable[[BlockTask, Piece], R], task: BlockTask, pieces: Sequence[Piece], workers: int) -> Iterator[R]:
-    """The function of every piece, in the order of the pieces, by so many processes; 1: this one."""
-    if workers == 1 or len(pieces) == 1:
-        return (function(task, piece) for piece in pieces)
-    return in_order(function, replace(task, model=text_of(task.loaded)), pieces, workers)
 
 
 def filtered_blocks(

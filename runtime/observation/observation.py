@@ -25,7 +25,7 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.model.generated import GeneratedModel, check_states
-from runtime.observation.by_blocks import BlockTask, Layout, instants_of, of_pieces, piece_rows, row_counts
+from runtime.observation.by_blocks import BlockTask, Layout, instants_of, piece_rows, row_counts
 from runtime.observation.filters import States, decimated, filtered_states, median_filtered
 from runtime.observation.pieces import Piece, pieces
 from runtime.observation.regressor_signals import decimated_columns
@@ -44,6 +44,7 @@ from runtime.observation.system import (
     same_settings,
     stack,
 )
+from runtime.parallel import Workers, in_order, started
 from runtime.records.record import Record
 from runtime.records.stream import RecordStream, Stream
 from runtime.settings.study import Rows, Signals, Study, to_mapping
@@ -74,7 +75,7 @@ def observe(
     constants: Mapping[str, float] | None = None,
     windows: Sequence[Window] | None = None,
     needed_by: str = "",
-    workers: int = 1,
+    workers: int | Workers = 1,
 ) -> Observation:
     """Y = W X + rho of one record, or of several stacked: filtered, differentiated, decimated, rows left out.
 
@@ -96,8 +97,8 @@ def observe(
         Windows that `Observation.between` will be asked for where rows are reduced; default: study.validate.split, or the two halves.
     needed_by : str, optional
         What needs the rows themselves, such as a method of estimation.
-    workers : int, optional
-        Processes that observe the pieces of long records read by blocks; 1: this one. The results do not depend on it in any bit.
+    workers : int or Workers, optional
+        Processes, this one among them, that observe the pieces of long records read by blocks. The results do not depend on it in any bit.
 
     Returns
     -------
@@ -118,7 +119,8 @@ def observe(
     blocks = [record.block for record in several if not isinstance(record, Record)]
     if blocks:
         streams = [RecordStream(record, blocks[0]) if isinstance(record, Record) else record for record in several]
-        observation = _observed_by_blocks(model, streams, study, constants or {}, windows, needed_by, workers)
+        with started(workers) as processes:
+            observation = _observed_by_blocks(model, streams, study, constants or {}, windows, needed_by, processes)
         return observation if columns is None else observation.columns(columns)
     parts = []
     for record in several:
@@ -210,7 +212,7 @@ def _observed_by_blocks(
     constants: Mapping[str, float],
     windows: Sequence[Window] | None,
     needed_by: str,
-    workers: int,
+    workers: Workers,
 ) -> Observation:
     """Rows of several records read by blocks: held while W takes at most HELD bytes, else reduced.
 
@@ -221,7 +223,7 @@ def _observed_by_blocks(
     every = [piece for own in cut for piece in own]
     task = BlockTask(model, tuple(streams), study, constants).with_starts(every)
     if task.filters_choose:
-        counted = dict(zip(every, of_pieces(row_counts, task, every, workers), strict=True))
+        counted = dict(zip(every, in_order(row_counts, task, every, workers), strict=True))
     else:
         cut_whole = [Piece(k, 0, len(stream), whole, ()) for k, (stream, whole) in enumerate(zip(streams, wholes, strict=True))]
         counted = {piece: row_counts(task, piece) for piece in cut_whole}
@@ -242,7 +244,7 @@ def _observed_by_blocks(
     kept = HeldRows(columns, counts if held else np.array([at.shown for at in layouts]), len(names))
     factors = tuple(SegmentFactors(k, at.t0, length, cuts, columns) for k, at in enumerate(layouts))
     wanted = replace(task, factors=None if held else deepcopy(factors))
-    for piece, (blocks, own) in zip(every, of_pieces(piece_rows, wanted, every, workers), strict=True):
+    for piece, (blocks, own) in zip(every, in_order(piece_rows, wanted, every, workers), strict=True):
         for block in blocks:
             kept.take(piece.record, *block)
         if own is not None:

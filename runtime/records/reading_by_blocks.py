@@ -137,10 +137,15 @@ def records_or_streams(
     missing: bool = False,
 ) -> list[Record] | list[Stream]:
     """The records, all of them in memory, or all of them to be read by blocks, as the setting `stream` of a study says."""
-    if stream == "off" or (stream == "auto" and not are_large(settings, folder)):
+    if stream == "off" or not is_stream(settings, stream, folder):
         return read_records(settings, model, folder=folder, missing=missing)
     streams: list[Stream] = [*open_streams(settings, model, folder=folder, block=BLOCK if stream == "auto" else stream, missing=missing)]
     return streams
+
+
+def is_stream(settings: Sequence[RecordSettings], stream: Literal["auto", "off"] | int, folder: str | Path | None = None) -> bool:
+    """Whether these records are to be read by blocks."""
+    return are_large(settings, folder) if stream == "auto" else stream != "off"
 
 
 def are_large(settings: Sequence[RecordSettings], folder: str | Path | None = None) -> bool:

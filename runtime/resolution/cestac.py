@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from itertools import groupby
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from runtime.estimators.closed_loop import LoopSimulator
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.methods import estimate_of
 from runtime.model.compile_cache import processor
-from runtime.model.compiled import target_of, text_of
+from runtime.model.compiled import target_of
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, drives_of
 from runtime.parallel import results
@@ -35,7 +35,7 @@ from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.c.workspace import usable
 from runtime.resolution.checkpoint import Checkpoint
-from runtime.resolution.loop import Loop, LoopText, loop_of, without_loop_options
+from runtime.resolution.loop import Loop, loop_of, without_loop_options
 from runtime.resolution.perturbed import PreparedRecord, Task, column_errors, perturbed, prepared_records, study_columns, with_deviation
 from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.run import USABLE, forget, run_block
@@ -80,10 +80,10 @@ def cestac(
     constants : mapping, optional
         Values in place of the robot file's.
     workers : int
-        Processes, 0 for this one (`runtime.parallel`); the results do not depend on it. A script that asks for processes needs the usual
+        Processes, this one among them (`runtime.parallel`); the results do not depend on it. A script that asks for processes needs the usual
         `if __name__ == "__main__"`.
     scheduler : str, optional
-        Address of a Dask cluster that works instead (`runtime.parallel`), with the same results.
+        Address of a Dask cluster that works instead (`runtime.cluster`), with the same results.
     progress : callable, optional
         Called with the number of runs done and their total.
     checkpoint : Checkpoint, optional
@@ -230,7 +230,8 @@ def _all_runs(
     done, total, known = len(parts[0]), runs * len(levels), parts[0].keys
     missing = [key for level in levels for run in range(runs) if (key := (level, run)) not in known]
     try:
-        for part in _results(task, key_blocks(missing, runs, len(levels), task.settings.common), workers, scheduler):
+        blocks = key_blocks(missing, runs, len(levels), task.settings.common)
+        for part in results(run_block, task, blocks, workers, scheduler=scheduler):
             parts.append(part)
             done += len(part)
             if checkpoint is not None:
@@ -242,15 +243,6 @@ def _all_runs(
         if checkpoint is not None:
             checkpoint.flush()
     return Runs.joined(parts, b)
-
-
-def _results(task: Task, blocks: Sequence[tuple[Key, ...]], workers: int, scheduler: str | None) -> Iterator[Runs]:
-    """Blocks of runs, from this process, several, or a cluster."""
-    if not blocks or not (workers or scheduler):
-        return results(run_block, task, blocks)
-    loop = LoopText.of(task.loop) if isinstance(task.loop, Loop) else None
-    sent = replace(task, model=text_of(cast(GeneratedModel, task.model)), loop=loop)
-    return results(run_block, sent, blocks, workers, scheduler=scheduler)
 
 
 def _measured(record: PreparedRecord) -> Iterator[memoryview]:

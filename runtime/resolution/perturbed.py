@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from runtime.errors import InputError
 from runtime.estimators.closed_loop import LoopPart
 from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import linear_companion, observed, point_estimate
+from runtime.model.compiled import text_of
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, ModelText, base_columns
 from runtime.observation.filters import States, filtered_states
@@ -80,7 +82,7 @@ class Task:
     ----------
     records : tuple of PreparedRecord
     model : GeneratedModel or ModelText
-        The module, or its text for another process.
+        The module; its text in other processes.
     names : tuple of str
         Columns, as fitted.
     estimate, settings : EstimateSettings, CestacSettings
@@ -90,7 +92,7 @@ class Task:
     constants : mapping
         Values in place of the robot file's.
     loop : Loop, LoopText or None
-        Closed loop, or its text for another process, of a study that simulates one.
+        Closed loop, of a study that simulates one; its text in other processes.
     errors : ndarray, shape (n, b, b), or None
         Of method tls: covariance of the errors of one row of joint j, by encoder errors of variance 1.
     """
@@ -105,6 +107,12 @@ class Task:
     constants: Mapping[str, float]
     loop: Loop | LoopText | None = None
     errors: Array | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For other processes: model and loop as text."""
+        loop = LoopText.of(self.loop) if isinstance(self.loop, Loop) else self.loop
+        model = self.model if isinstance(self.model, ModelText) else text_of(self.model)
+        return {**vars(self), "model": model, "loop": loop}
 
     def opened(self) -> tuple[Task, GeneratedModel]:
         """The task and the model as they run in this process."""

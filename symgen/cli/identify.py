@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from runtime.parallel import Workers
 from runtime.result_files import reserved
 from symgen.cli.session import (
     NEGATIVE,
@@ -46,21 +47,25 @@ def identify(
     ] = True,
     workers: Annotated[
         int,
-        typer.Option(min=1, help="Processes that read and filter long records by blocks; 1: this one. The results do not depend on it."),
+        typer.Option(
+            min=1, help="Processes that read and filter long records by blocks, this one among them. The results do not depend on it."
+        ),
     ] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print estimate.json instead of tables.")] = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code 1 where the estimator does not end well."""
     single_thread()
-    with reported_errors(), progress_lines(), reserved(output) as results:
+    with reported_errors(), progress_lines(), reserved(output) as results, Workers(workers) as processes:
         import runtime
         from runtime.model.compile_cache import processor
         from runtime.model.compiled import target_of
-        from runtime.records.reading_by_blocks import records_or_streams
+        from runtime.records.reading_by_blocks import is_stream, records_or_streams
 
         model = model_of(robot, target)
         study = study_of_arguments(record)
         study = study if block is None else replace(study, stream=block)
+        if is_stream(study.record, study.stream):
+            processes.start("runtime.observation.by_blocks")
         records = records_or_streams(study.record, model, study.stream, missing=study.signals.admits_missing)
         computed = {"target": target_of(model), "processor": processor()}
         result = runtime.identify(
@@ -71,7 +76,7 @@ def identify(
             friction=friction,
             variants=variants_of(robot) if plausible else None,
             plausible=plausible,
-            workers=workers,
+            workers=processes,
             provenance=computed,
         )
         if results is not None:

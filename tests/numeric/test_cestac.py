@@ -227,7 +227,7 @@ def test_motor_side_divides_the_step_by_the_ratio():
     with pytest.raises(SettingsError, match="no drives"):
         cestac(blind, RECORD, study(side="motor"))
     with pytest.raises(InputError, match="workers=0"):
-        cestac(blind, RECORD, study(), workers=1)
+        cestac(blind, RECORD, study(), workers=2)
 
 
 def test_verdicts():

@@ -1,0 +1,42 @@
+"""BLAS with one thread: several would fight for the cores, and their number could change the last bit of a sum."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "BLIS_NUM_THREADS")
+
+
+def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
+    """The function with one BLAS thread while it runs: its matrices are small, and several threads wait for each other ten times as long as they compute."""
+
+    @wraps(function)
+    def alone(*args: P.args, **kwargs: P.kwargs) -> R:
+        from threadpoolctl import threadpool_limits
+
+        with threadpool_limits(1, "blas"):
+            return function(*args, **kwargs)
+
+    return alone
+
+
+@contextmanager
+def inherited_single_thread() -> Iterator[None]:
+    """The environment of processes that are started meanwhile, whose BLAS then has one thread; as before afterwards."""
+    before = {name: os.environ.get(name) for name in BLAS_THREADS}
+    os.environ.update(dict.fromkeys(BLAS_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
