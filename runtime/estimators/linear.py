@@ -6,7 +6,7 @@ j by s_j. Removing columns from a System is cheap, which is what `runtime.estima
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -74,11 +74,15 @@ class System:
 
     def select(self, names: Sequence[str]) -> System:
         """The system with the columns `names` only."""
-        return replace(self, raw=self.raw.select(names), weighted=self.weighted.select(names))
+        return self._changed(lambda factor: factor.select(names))
 
     def drop(self, name: str) -> System:
         """The system without one column, by down-dating its triangular factor."""
-        return replace(self, raw=self.raw.drop(name), weighted=self.weighted.drop(name))
+        return self._changed(lambda factor: factor.drop(name))
+
+    def _changed(self, change: Callable[[Factor], Factor]) -> System:
+        raw = change(self.raw)
+        return replace(self, raw=raw, weighted=raw if self.weighted is self.raw else change(self.weighted))
 
     def solve(self) -> Solution:
         """Least-squares solution of the weighted system."""
@@ -156,7 +160,7 @@ def assemble(
         covariance=C,
         sigma_corrected=corrected,
         sigma_rho=sigma_rho,
-        cond=fit.cond,
+        cond=condition(system.weighted, fit.rank),
         cond_unit=fit.cond_unit,
         rank=fit.rank,
         residual_norm=total,
@@ -181,6 +185,12 @@ def correlated_covariance(system: System, fit: Solution) -> tuple[float, Array]:
         return block, np.full((b, b), np.nan)
     rows = observation.block_rows(system.names, 1 / np.array(system.scales), block, system.whitener)
     return block, block_covariance(rows, fit.X, fit.T)
+
+
+def condition(factor: Factor, rank: int) -> float:
+    """Condition number of W; inf where its rank is not full."""
+    b = len(factor.names)
+    return (float(np.linalg.cond(factor.R11)) if b else 1.0) if rank == b else np.inf
 
 
 def outcome(system: System, fit: Solution) -> tuple[Status, str]:

@@ -37,8 +37,8 @@ class Solution:
         ||Y - W X|| of the factored system, weighted if its rows are.
     rank : int
         Numerical rank of W with unit columns.
-    cond, cond_unit : float
-        Condition number of W, and of W with unit columns.
+    cond_unit : float
+        Condition number of W with unit columns.
     groups : tuple of tuples of str
         Names that this record cannot tell apart; a group of one has no effect on the rows.
     """
@@ -47,7 +47,6 @@ class Solution:
     T: Array
     residual_norm: float
     rank: int
-    cond: float
     cond_unit: float
     groups: tuple[tuple[str, ...], ...]
 
@@ -76,18 +75,18 @@ def solve(factor: Factor, tolerance: float | None = None) -> Solution:
     b = len(factor.names)
     tolerance = rank_tolerance(factor) if tolerance is None else tolerance
     if b == 0:
-        return Solution(np.zeros(0), np.zeros((0, 0)), factor.r22, 0, 1.0, 1.0, ())
+        return Solution(np.zeros(0), np.zeros((0, 0)), factor.r22, 0, 1.0, ())
     R, D = unit_columns(factor.R11)
     U, s, Vt = np.linalg.svd(R)
     rank = int(np.count_nonzero(s > tolerance * s[0]))
     if rank == b:
         X = solve_triangular(factor.R11, factor.r12)
         T = solve_triangular(factor.R11, np.eye(b))
-        return Solution(X, T, factor.r22, b, float(np.linalg.cond(factor.R11)), float(s[0] / s[-1]), ())
+        return Solution(X, T, factor.r22, b, float(s[0] / s[-1]), ())
     T = Vt[:rank].T / s[:rank] / D[:, None]
     z = U[:, :rank].T @ factor.r12
     residual = float(np.hypot(factor.r22, np.linalg.norm(U[:, rank:].T @ factor.r12)))
-    return Solution(T @ z, T, residual, rank, np.inf, np.inf, null_groups(Vt[rank:], factor.names))
+    return Solution(T @ z, T, residual, rank, np.inf, null_groups(Vt[rank:], factor.names))
 
 
 def null_groups(V2t: Array, names: Sequence[str], participation: float = PARTICIPATION) -> tuple[tuple[str, ...], ...]:

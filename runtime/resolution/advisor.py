@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
+from functools import cached_property, partial, reduce
 from itertools import count
 from operator import add
 from typing import Any
@@ -70,21 +70,22 @@ class Predictor:
 
     def change(self, delta: float, encoders: Sequence[int]) -> Array:
         """100 (X(v)/X(0) - 1), shape (b,), in %."""
-        X = self._solved(self.share * delta**2, encoders)
+        X = self._total(self.share * delta**2, encoders).solve(self.weights)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(100 * (X / self._solved(0.0, ()) - 1))
+            return np.asarray(100 * (X / self.exact - 1))
+
+    @cached_property
+    def exact(self) -> Array:
+        """X with exact encoders, shape (b,)."""
+        return self._total(0.0, ()).solve(self.weights)
 
     def rate(self, encoders: Sequence[int]) -> Array:
         """Change in % per Delta^2 at Delta = 0, shape (b,), columns that switch left out."""
-        clean = self._total(0.0, ())
-        X = clean.solve(self.weights)
+        clean, X = self._total(0.0, ()), self.exact
         added = reduce(add, [part.smooth[i] for part in self.parts for i in encoders])
         moved = NormalEquations(clean.G, added.g - added.G @ X).solve(self.weights)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(100 * self.share * moved / X)
-
-    def _solved(self, variance: float, encoders: Sequence[int]) -> Array:
-        return self._total(variance, encoders).solve(self.weights)
 
     def _total(self, variance: float, encoders: Sequence[int]) -> NormalEquations:
         return reduce(add, [part.expected(variance, encoders) for part in self.parts])

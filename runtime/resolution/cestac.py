@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from itertools import groupby
 from typing import Any
@@ -150,7 +151,7 @@ def cestac(
         "torque_side": "joint" if drives is None else "motor",
         **({} if loop is None else {"controller": to_mapping(loop.simulator.controller)}),
     }
-    runs = _all_runs(task, _identity(task, described, reference.provenance), workers, scheduler, progress, checkpoint)
+    runs = _all_runs(task, partial(_identity, task, described, reference.provenance), workers, scheduler, progress, checkpoint)
     by_level = [runs.where(runs.level == k) for k in range(len(task.levels))]
     levels = list(zip(task.levels, by_level, strict=True))
     if settings.place == "loop":
@@ -217,15 +218,15 @@ def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> lis
 
 def _all_runs(
     task: Task,
-    identity: Mapping[str, Any],
+    identity: Callable[[], Mapping[str, Any]],
     workers: int,
     scheduler: str | None,
     progress: Progress | None,
     checkpoint: Checkpoint | None,
 ) -> Runs:
-    """Every run, by level and number, in whatever order they finished. identity : what tells this study from others on disk."""
+    """Every run, by level and number, in whatever order they finished. identity : gives what tells this study from others on disk."""
     runs, levels, b = task.settings.runs, range(len(task.levels)), len(task.names)
-    finished = checkpoint.resume(identity, b) if checkpoint else Runs.of((), b)
+    finished = checkpoint.resume(identity(), b) if checkpoint else Runs.of((), b)
     parts = [finished.where((finished.level < len(levels)) & (finished.run < runs))]
     done, total, known = len(parts[0]), runs * len(levels), parts[0].keys
     missing = [key for level in levels for run in range(runs) if (key := (level, run)) not in known]

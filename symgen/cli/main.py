@@ -85,6 +85,8 @@ def main() -> None:
     except OSError as e:  # help or version to a full disk; the verbs report their own
         typer.echo(f"error: cannot print: {e.strerror or e}", err=True)
         sys.exit(2)
+    finally:
+        gc.freeze()  # what is left ends with the process: it need not be searched once more
 
 
 def _open_streams() -> None:

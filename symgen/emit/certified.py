@@ -111,14 +111,13 @@ def model(robot: str | Path | Robot, *, target: str = "numpy") -> ModuleType:
     robot = robot if isinstance(robot, Robot) else load_robot(robot)
     if target not in PYTHON:
         raise SymgenError(f"target {target!r}; Python imports {', '.join(PYTHON)}; `symgen generate --target c` writes C")
-    regrouping = regroup(robot)
-    files = generate_files(robot, targets=(target,), regrouping=regrouping)
+    files = generate_files(robot, targets=(target,))
     if not files:
         raise SymgenError(f"{robot.name}: no {target} module, since its loops are closed by iteration; the NumPy module serves")
     ((file, text),) = files.items()
     path = cached_path(file, text)
     if path is None:  # what lies in the cache has been certified
-        require_valid(certify(regrouping, text if target == "numpy" else None))
+        require_valid(certify(regroup(robot), text if target == "numpy" else None))
         path = stored_path(file, text)
     module = imported(path)
     if target == "numpy":  # runtime asks for it where it simulates

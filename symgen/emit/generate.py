@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 from symgen.description.robot import Robot
 from symgen.emit import c_target, casadi_target, numpy_target, xp_target
@@ -44,6 +45,12 @@ def generate_files(
     dict
         {file name: text}. Same robot file, same version: same bytes.
     """
-    spec = module_spec(regrouping or regroup(robot))
+    spec = derived(robot) if regrouping is None else module_spec(regrouping)
     served = [name for name in targets if TARGETS[name].iterates or not spec.tied]
     return {TARGETS[name].file.format(robot.name): PRINTERS[name](spec, command) for name in served}
+
+
+@lru_cache(maxsize=2)
+def derived(robot: Robot) -> ModuleSpec:
+    """The models of a robot over its base parameters; kept, since its module and its C file are asked for one after the other."""
+    return module_spec(regroup(robot))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from runtime.errors import InputError
 from runtime.identification.plausibility.fits import solved
@@ -158,7 +158,8 @@ class _Problem:
             raise InputError(f"{len(kept)} instants for {self.b} parameters and {self.n} delays; use a longer record", file=record.name)
         self.t, self.longest = record.t[kept], longest
         self.grid = (0.0, *(sign * d for d in (0.002, 0.005, 0.01, 0.02, 0.04, 0.07) for sign in (1, -1) if d < longest))
-        self.torque = CubicSpline(record.t, tau)
+        spline = CubicSpline(record.t, tau)
+        self.torques = [PPoly(spline.c[:, :, j], spline.x) for j in range(self.n)]
 
         def W(k: Array) -> Array:
             return np.asarray(model.regressor(states.q[k], states.qd[k], states.qdd[k]))
@@ -175,7 +176,7 @@ class _Problem:
 
     def shifted(self, shift: Array) -> Array:
         """Y_j(t + delta_j), shape (K, n)."""
-        return np.column_stack([self.torque(self.t + d)[:, j] for j, d in enumerate(shift)])
+        return np.column_stack([torque(self.t + d) for torque, d in zip(self.torques, shift, strict=True)])
 
     def fit(self, shift: Array) -> tuple[Array, Array, Array]:
         """X, sigma by joint, and the residuals, shape (K, n)."""
