@@ -62,6 +62,23 @@ class Workers:
         for other in self.others:
             other.start(*modules)
 
+    def meanwhile(self, function: Callable[[], R]) -> Callable[[], R]:
+        """What gives the value of a function, which is pickled: another process, if one has been started, computes it before the tasks that come later;
+        where there is none, or it dies, this process does when it is asked."""
+        running = [other.pool for other in self.others if other.pool is not None]
+        try:
+            future = running[-1].submit(function)
+        except (IndexError, BrokenProcessPool):
+            return function
+
+        def value() -> R:
+            try:
+                return future.result()
+            except BrokenProcessPool:
+                return function()
+
+        return value
+
     def __enter__(self) -> Workers:
         return self
 

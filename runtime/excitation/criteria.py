@@ -102,14 +102,17 @@ class Weights:
         spread = np.zeros((W.shape[1], W.shape[1]))  # W' Omega W
         instant = np.rint((observation.t - observation.t.min()) * observation.rate).astype(int)
         instant += observation.record * (int(instant.max(initial=0)) + len(correlation))  # no two records are neighbours
+        known = np.append(correlation, 0.0)
         for j in range(observation.n):
             own = observation.joint(j)
-            at, rows = instant[own], W[own]
-            spread += correlation[0] * rows.T @ rows
-            for k, r in enumerate(correlation[1:], start=1):
-                _, first, later = np.intersect1d(at + k, at, assume_unique=True, return_indices=True)
-                shifted = rows[first].T @ rows[later]
-                spread += r * (shifted + shifted.T)
+            acting = np.flatnonzero(W[own].any(axis=0))
+            at, rows = instant[own], W[own][:, acting]
+            upper = correlation[0] / 2 * rows  # Omega W_j, of Omega the upper half alone
+            for k in range(1, len(correlation)):  # rows: as many periods apart, or more where some between are left out
+                r = known[np.minimum(at[k:] - at[:-k], len(correlation))]
+                upper[:-k] += r[:, None] * rows[k:]
+            product = rows.T @ upper
+            spread[np.ix_(acting, acting)] += product + product.T
         C = inverse @ inverse.T @ spread @ inverse @ inverse.T
         return np.asarray(100 * np.sqrt(np.diag(C)))
 

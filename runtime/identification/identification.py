@@ -24,14 +24,14 @@ from runtime.identification.friction import friction_curves
 from runtime.identification.homogeneity import homogeneity
 from runtime.identification.parameter_sets import SetName, best_set, parameter_sets
 from runtime.identification.payload_study import payload_study
-from runtime.identification.plausibility.plausibility import plausibility
+from runtime.identification.plausibility.plausibility import PlausibilityTask
 from runtime.identification.result import Identification
 from runtime.identification.uncertainty import uncertainty
 from runtime.identification.validation import CrossValidation, cross_validation, direct_comparison, split_validation, weak_directions
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import physical_model
 from runtime.observation.system import halves
-from runtime.parallel import Workers
+from runtime.parallel import Workers, started
 from runtime.progress import at
 from runtime.records.provenance import origin, record_names
 from runtime.records.reading_by_blocks import records_or_streams
@@ -103,70 +103,71 @@ def identify(
     simulator = simulator or simulator_of(model, study)
     if further is None:
         further = records_or_streams(study.validate.record, model, study.stream, missing=study.signals.admits_missing)
-    observed = partial(method_observation, model, study=study, workers=workers)
-    observation = observed(records, simulator=simulator)
-    at("least squares, essential parameters")
-    reduced = essential_of(observation, study.essential, linear_companion(study.estimate), model=model, provenance=provenance)
-    sets: dict[SetName, Estimate] = {}
-    missing: list[str] = []
-    if study.estimate.method in LINEAR:
-        sets, how, note = parameter_sets(observation, study.estimate, reduced, model=model)
-        fit, missing = reduced.all_parameters, [note] if note else []
-    else:
-        at(study.estimate.method)
-        fit = estimate_of(observation, study.estimate, model=model, provenance=provenance)
-        how = {"all": study.estimate, "essential": replace(study.estimate, columns=reduced.names)}
-    windows = study.validate.split or halves(*observation.span)
-    names = record_names([*records, *further])
-    fitted, others = ", ".join(names[: len(records)]), names[len(records) :]
-    validation: list[CrossValidation] = []
-    ended = fit.status == "ok" or study.estimate.method in LINEAR  # else each validation would simulate a loop that is wrong once more
-    if ended:
-        at("validation")
-        try:
-            validation = [split_validation(observation, windows, how, model=model)]
-        except InputError as e:
-            missing = [*missing, f"validation between windows of the record: {e}"]
-    else:
-        missing = [*missing, f"validation: {study.estimate.method} ended with status {fit.status}"]
-    parts = {name: observed([record], windows=()) for name, record in zip(others, further, strict=True)}
-    if parts and ended:
-        known = sets or {"all": fit}
-        validation.append(cross_validation(observation, parts, how, name=fitted, model=model, fitted=known))
-    missing += [text for part in validation for text in part.missing]
-    best = best_set(validation[-1].errors() if validation and sets else {})
-    if best == "feasible" and sets:
-        at("physical parameters, records of resampled blocks")
-        options = {key: value for key, value in how[best].options.items() if key != "bootstrap"}
-        sets[best] = estimate_of(observation, replace(how[best], options=options), model=model, provenance=provenance)
-    comparison = direct_comparison(observation.first_rows, sets[best] if sets else fit)
-    each = {name: observation.of_record(k) for k, name in enumerate(names[: len(records)])} if len(names) > 1 else {}
-    result = Identification(
-        model=model,
-        study=study,
-        records=records,
-        observation=observation,
-        estimate=fit,
-        essential=reduced,
-        comparison=comparison,
-        validation=tuple(validation),
-        sets=sets,
-        homogeneity=homogeneity({**each, **parts}, reduced.names, study.estimate, model=model) if each else None,
-        missing=tuple(missing),
-        correlations=weak_directions(observation, study.estimate),
-        coupling=coupling_fits(model, records, study, observation, fit, partial(observed, windows=())),
-        uncertainty=uncertainty(observation, study.estimate, reduced, comparison),
-    )
-    whole = whole_records(records) if friction or study.payload is not None else []
-    return replace(
-        result,
-        payload=None if study.payload is None else payload_study(model, whole, study, provenance=origin(records)),
-        feasibility=feasibility_of(result) if physical and not result.feasible else None,
-        friction=friction_curves(model, whole, study, fit) if friction else (),
-        plausibility=plausibility(model, records, study, variants=variants)
-        if (variants is not None if plausible is None else plausible)
-        else None,
-    )
+    asked = variants is not None if plausible is None else plausible
+    with started(workers) as processes:
+        judged = processes.meanwhile(PlausibilityTask(model, records, study, variants)) if asked else None
+        observed = partial(method_observation, model, study=study, workers=processes)
+        observation = observed(records, simulator=simulator)
+        at("least squares, essential parameters")
+        reduced = essential_of(observation, study.essential, linear_companion(study.estimate), model=model, provenance=provenance)
+        sets: dict[SetName, Estimate] = {}
+        missing: list[str] = []
+        if study.estimate.method in LINEAR:
+            sets, how, note = parameter_sets(observation, study.estimate, reduced, model=model)
+            fit, missing = reduced.all_parameters, [note] if note else []
+        else:
+            at(study.estimate.method)
+            fit = estimate_of(observation, study.estimate, model=model, provenance=provenance)
+            how = {"all": study.estimate, "essential": replace(study.estimate, columns=reduced.names)}
+        windows = study.validate.split or halves(*observation.span)
+        names = record_names([*records, *further])
+        fitted, others = ", ".join(names[: len(records)]), names[len(records) :]
+        validation: list[CrossValidation] = []
+        ended = fit.status == "ok" or study.estimate.method in LINEAR  # else each validation would simulate a loop that is wrong once more
+        if ended:
+            at("validation")
+            try:
+                validation = [split_validation(observation, windows, how, model=model)]
+            except InputError as e:
+                missing = [*missing, f"validation between windows of the record: {e}"]
+        else:
+            missing = [*missing, f"validation: {study.estimate.method} ended with status {fit.status}"]
+        parts = {name: observed([record], windows=()) for name, record in zip(others, further, strict=True)}
+        if parts and ended:
+            known = sets or {"all": fit}
+            validation.append(cross_validation(observation, parts, how, name=fitted, model=model, fitted=known))
+        missing += [text for part in validation for text in part.missing]
+        best = best_set(validation[-1].errors() if validation and sets else {})
+        if best == "feasible" and sets:
+            at("physical parameters, records of resampled blocks")
+            options = {key: value for key, value in how[best].options.items() if key != "bootstrap"}
+            sets[best] = estimate_of(observation, replace(how[best], options=options), model=model, provenance=provenance)
+        comparison = direct_comparison(observation.first_rows, sets[best] if sets else fit)
+        each = {name: observation.of_record(k) for k, name in enumerate(names[: len(records)])} if len(names) > 1 else {}
+        result = Identification(
+            model=model,
+            study=study,
+            records=records,
+            observation=observation,
+            estimate=fit,
+            essential=reduced,
+            comparison=comparison,
+            validation=tuple(validation),
+            sets=sets,
+            homogeneity=homogeneity({**each, **parts}, reduced.names, study.estimate, model=model) if each else None,
+            missing=tuple(missing),
+            correlations=weak_directions(observation, study.estimate),
+            coupling=coupling_fits(model, records, study, observation, fit, partial(observed, windows=())),
+            uncertainty=uncertainty(observation, study.estimate, reduced, comparison),
+        )
+        whole = whole_records(records) if friction or study.payload is not None else []
+        return replace(
+            result,
+            payload=None if study.payload is None else payload_study(model, whole, study, provenance=origin(records)),
+            feasibility=feasibility_of(result) if physical and not result.feasible else None,
+            friction=friction_curves(model, whole, study, fit) if friction else (),
+            plausibility=judged() if judged else None,
+        )
 
 
 def feasibility_of(result: Identification) -> Feasibility:

@@ -65,7 +65,7 @@ def identify(
         study = study_of_arguments(record)
         study = study if block is None else replace(study, stream=block)
         if is_stream(study.record, study.stream):
-            processes.start("runtime.observation.by_blocks")
+            processes.start("runtime.identification.identification")
         records = records_or_streams(study.record, model, study.stream, missing=study.signals.admits_missing)
         computed = {"target": target_of(model), "processor": processor()}
         result = runtime.identify(

@@ -194,6 +194,15 @@ def test_blocks_give_the_same_result(whole, monkeypatch, held):
         np.testing.assert_allclose(blocks["coupling"][key]["relative_error"], fit["relative_error"], rtol=1e-9)
 
 
+@campaign
+def test_workers_give_the_same_bytes(tmp_path):
+    """The plausibility checks, which another process makes meanwhile, included."""
+    t = np.arange(20_000) / 1000
+    np.savez(tmp_path / "axis.npz", t=t, q1=0.2 * np.sin(6 * t) + 0.1 * np.sin(17 * t), tau1=20 * np.cos(6 * t))
+    one, two = (run("emps", tmp_path / "axis.npz", "--json", "--block", 5000, "--workers", count).stdout for count in (1, 2))
+    assert one == two and json.loads(one)["plausibility"]["checks"]
+
+
 def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
     """Unless the study says otherwise; the result says so."""
     t = np.arange(3000) / 1000

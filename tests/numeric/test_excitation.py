@@ -10,13 +10,13 @@ from campaign import campaign
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.methods import estimate_of
-from runtime.excitation.criteria import excesses, limits_of, planned, usage, weights_of
+from runtime.excitation.criteria import Weights, excesses, limits_of, planned, usage, weights_of
 from runtime.excitation.optimiser import Problem, improved, one_start, smoothed
 from runtime.excitation.search import excite
 from runtime.model.casadi import load_symbolic
 from runtime.model.generated import load_model
 from runtime.motion.dry_friction import dry_friction
-from runtime.observation.observation import observe
+from runtime.observation.observation import Observation, observe
 from runtime.records.record import Record
 from runtime.settings.excitation import ExcitationSettings, Sphere
 from runtime.settings.schema import structure
@@ -73,6 +73,23 @@ def test_smooth_sign_is_tanh_and_nothing_else_changes(planar: tuple) -> None:
     friction = [symbolic.BASE_PARAMETERS.index(name) for name in ("FS1", "FS2")]
     assert np.allclose(near[[0, 1], friction], np.tanh([0.5, -0.2]))
     assert ca.OP_SIGN not in [smooth.instruction_id(k) for k in range(smooth.n_instructions())]
+
+
+def test_predicted_deviations_with_correlated_noise_and_rows_left_out() -> None:
+    """(W'W)^-1 W' Omega W (W'W)^-1 with Omega written out: rows of one joint and one record, by the instants between them."""
+    rng = np.random.default_rng(0)
+    instants, r = [np.flatnonzero(rng.random(60) < 0.7) for _ in range(4)], np.array([1.0, -0.5, 0.3, 0.1])
+    k, record, joint = (
+        np.concatenate(x) for x in (instants, *([np.full(len(a), b) for a, b in zip(instants, c, strict=True)] for c in ("0101", "0011")))
+    )
+    record, joint = record.astype(int), joint.astype(int)
+    W = rng.standard_normal((len(k), 3)) * np.array([[1, 1, 0], [1, 0, 1]])[joint]
+    observation = Observation(W, np.zeros(len(k)), tuple(np.bincount(joint)), ("a", "b", "c"), k / 50.0, record, 50.0)
+    apart = np.abs(k[:, None] - k)
+    together = (record[:, None] == record) & (joint[:, None] == joint) & (apart < len(r))
+    Omega, inverse = np.where(together, r[np.minimum(apart, 3)], 0.0), np.linalg.inv(W.T @ W)
+    expected = 100 * np.sqrt(np.diag(inverse @ W.T @ Omega @ W @ inverse))
+    np.testing.assert_allclose(Weights(("a", "b", "c"), np.ones(2), np.ones(3)).relative_sigma(observation, r), expected, rtol=1e-10)
 
 
 @pytest.mark.parametrize("criterion", [pytest.param("cond", marks=campaign), "sigma", "logdet"])

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -132,6 +133,16 @@ def test_here_and_elsewhere_with_one_blas_thread(tmp_path):
             others.append(other)
     assert others[0] == others[1] and not Path(f"/proc/{other}").exists()
     assert {name: os.environ.get(name) for name in BLAS_THREADS} == before
+
+
+def test_a_value_is_computed_meanwhile_by_another_process():
+    """By this one where no other one is there, or it dies."""
+    with Workers(2) as workers:
+        assert workers.meanwhile(os.getpid)() == os.getpid()
+        workers.start()
+        assert workers.meanwhile(os.getpid)() != os.getpid()
+        assert workers.meanwhile(partial(always_dying, os.getpid(), 7))() == 7
+        assert sorted(results(pow, 2, range(4), workers)) == [1, 2, 4, 8]
 
 
 @pytest.mark.parametrize("workers", [0, 2])

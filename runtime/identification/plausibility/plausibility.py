@@ -25,7 +25,8 @@ from runtime.identification.plausibility.gravity import Gravity, gravity_directi
 from runtime.identification.plausibility.known import KnownValues, known_values
 from runtime.identification.plausibility.samples import STANDING, Samples, excerpts, samples_of
 from runtime.identification.plausibility.trials import ALIKE, DECISIVE, Problem, Trial, decisive, problem_of, tried
-from runtime.model.generated import GeneratedModel, joint_units
+from runtime.model.compiled import text_of
+from runtime.model.generated import GeneratedModel, ModelText, joint_units
 from runtime.model.inertia import physical_model
 from runtime.observation.observation import observe
 from runtime.progress import at
@@ -182,6 +183,29 @@ def plausibility(
         checks.append(better(problem, named))
     hidden = tuple(dict.fromkeys(trial.alternative.subject for trial in trials if trial.equivalent))
     return Plausibility(tuple(checks), tuple(t for t in trials if t.fit is not None)[:10], tuple(named), hidden, late, gravity, known)
+
+
+@dataclass(frozen=True, eq=False)
+class PlausibilityTask:
+    """The arguments of `plausibility` for this process or another one, which is sent models as text."""
+
+    model: GeneratedModel | ModelText
+    records: Sequence[Record | Stream]
+    study: Study
+    variants: GeneratedModel | ModelText | None
+
+    def __call__(self) -> Plausibility:
+        """What is found."""
+        model, variants = (x.load() if isinstance(x, ModelText) else x for x in (self.model, self.variants))
+        assert model is not None
+        return plausibility(model, self.records, self.study, variants=variants)
+
+    def __getstate__(self) -> dict[str, Any]:
+        texts = {
+            key: x if x is None or isinstance(x, ModelText) else text_of(x)
+            for key, x in (("model", self.model), ("variants", self.variants))
+        }
+        return {**vars(self), **texts}
 
 
 def _ranked(trials: Sequence[Trial]) -> list[Trial]:

@@ -32,6 +32,8 @@ def serve() -> None:
     path, topic, decimal, memory, seconds = json.loads(sys.stdin.buffer.readline())
     source = Source(Path(path), topic, decimal)
     format_ = format_of(source.path)
+    with suppress(BaseException):  # told where the file is asked for
+        load(format_)
     try:
         answer_requests(source, format_, answers, memory, seconds)
     finally:
@@ -45,8 +47,7 @@ def answer_requests(source: Source, format_: Format, answers: BinaryIO, memory: 
     for request in sys.stdin.buffer:
         try:
             if table is None:
-                for library in format_.libraries:
-                    import_module(library)
+                load(format_)
                 limit_memory(memory, allowed(source.size))
             limit_time(seconds)
             table = table or format_.open(source)
@@ -56,6 +57,12 @@ def answer_requests(source: Source, format_: Format, answers: BinaryIO, memory: 
             return
         except BaseException as e:  # panics of Rust are no Exceptions
             send(answers, {"error": described(e, format_, memory)})
+
+
+def load(format_: Format) -> None:
+    """The libraries that read the file."""
+    for library in format_.libraries:
+        import_module(library)
 
 
 def results(table: Table, call: str, *arguments: Any) -> Iterator[Any]:

@@ -52,7 +52,8 @@ class Limits:
 class Process:
     """The other process: started, asked and ended. It ends with this object, and with the one that started it."""
 
-    def __init__(self, source: Source, limits: Limits) -> None:
+    def __init__(self, source: Source) -> None:
+        limits = Limits.of(source.size)
         folder = TemporaryDirectory(prefix="symgen-record-")  # of the other process, which may be ended before it can tidy up
         self.popen = subprocess.Popen(
             [sys.executable, "-P", "-c", START, *sys.path],
@@ -102,9 +103,10 @@ class IsolatedTable(Table):
     idle: Process | None = field(default=None, init=False)
 
     @classmethod
-    def start(cls, source: Source, title: str) -> IsolatedTable:
-        """The table of a file; InputError where the file cannot be opened."""
+    def of(cls, source: Source, title: str, process: Process) -> IsolatedTable:
+        """The table of a file and of a process that waits for requests; InputError where the file cannot be opened."""
         table = cls(file=source.file, size=source.size, source=source, title=title)
+        table.idle = process
         names, joints, table.topic = table._value("describe")
         table.names, table.joints = tuple(names), None if joints is None else tuple(joints)
         return table
@@ -146,7 +148,7 @@ class IsolatedTable(Table):
 
     def _answers(self, call: str, *arguments: Any) -> Iterator[Any]:
         """The value, or the blocks, of a request."""
-        process, self.idle = self.idle or Process(self.source, Limits.of(self.size)), None
+        process, self.idle = self.idle or Process(self.source), None
         try:
             process.send([call, *arguments])
             while isinstance(answer := process.answer(), tuple):

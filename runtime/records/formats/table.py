@@ -16,7 +16,7 @@ from runtime.errors import InputError
 from runtime.files import sha256_of
 from runtime.records.formats.bags import digest_of, open_bag
 from runtime.records.formats.columns import Source, Table
-from runtime.records.formats.isolated import IsolatedTable
+from runtime.records.formats.isolated import IsolatedTable, Process
 from runtime.records.formats.mat import open_mat
 from runtime.records.formats.npz import open_npy, open_npz
 from runtime.records.formats.parquet import open_parquet
@@ -88,9 +88,11 @@ def open_table(path: Path, topic: str | None = None, decimal: str = ".", *, by_b
     require_readable(path, format_, by_blocks)
     if missing := [library for library in format_.libraries if find_spec(library.partition(".")[0]) is None]:
         raise InputError(needed(format_), file=path.name) from ImportError(missing[0])
-    source, digest = Source(path, topic, decimal), format_.digest(path)
+    source = Source(path, topic, decimal)
     isolated = format_.libraries or (source.packed and format_.packed == "whole")
-    table = IsolatedTable.start(source, format_.title) if isolated else format_.open(source)
+    reader = Process(source) if isolated else None  # it loads its libraries while the hash is computed
+    digest = format_.digest(path)
+    table = format_.open(source) if reader is None else IsolatedTable.of(source, format_.title, reader)
     table.digest = digest
     return table
 
