@@ -119,9 +119,9 @@ def settings_error(error: ValidationError, given: Any, path: tuple[str | int, ..
     alike = [(place, reason) for place, reason in problems if place[: len(first)] == first]
     deepest = max((place for place, _ in alike), key=len)
     reasons = [reason for place, reason in alike if place == deepest]
-    value = reasons[0].partition("; expected ")[0]
+    value, _, told = reasons[0].partition("; expected ")
     others = [reason.removeprefix(f"{value}; expected ") for reason in reasons[1:] if reason.startswith(f"{value}; expected ")]
-    return SettingsError(" or ".join(dict.fromkeys([reasons[0], *others])), path=(*path, *deepest))
+    return SettingsError(" or ".join([reasons[0], *(other for other in dict.fromkeys(others) if other != told)]), path=(*path, *deepest))
 
 
 def shown(value: Any) -> str:

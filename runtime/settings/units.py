@@ -104,6 +104,10 @@ def speed(value: Any) -> Any:
 def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
     if text == "grad":
         raise InputError("'grad' is a 400th of a turn to some and a degree to others; write units such as gon or deg")
+    if kinds == TORQUES and text.strip() in ("%", "percent", "per cent"):
+        raise InputError(
+            f"{text!r} of what? write the unit of the rated value, such as A or N*m, and a hundredth of the rated values in record.scale"
+        )
     kind, factor = TABLE[text] if text in TABLE else _of_pint(text)
     if kind not in kinds:
         known = f"is a unit of {kind}" if kind else "is not a unit known here"

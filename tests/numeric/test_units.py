@@ -59,6 +59,7 @@ def test_units_of_pint(read, name, kind, factor):
         (position_unit, "percent", "not a unit known here"),
         (position_unit, "grad", "such as gon or deg"),
         (position_unit, "Grad", "'Grad' is 1e+09 radian, which nothing here is measured in; expected units such as rad, deg"),
+        (torque_unit, "%", "'%' of what? write the unit of the rated value"),
         (torque_unit, "MA", "'MA' is 1e+06 ampere"),
         (position_unit, "s", "is a unit of time"),
         (torque_unit, "deg", "is a unit of angle; expected one of torque, force, current, voltage, such as N*m"),

@@ -31,6 +31,8 @@ RATES = (5.0, 1e5)
 """Sampling rates of logs, Hz."""
 SLOW = 0.005
 """Largest speed of the fastest joint, rad/s or m/s, below which nothing moves."""
+STILL = 1e-3
+"""Range of a joint, rad or m, below which it does not move."""
 REST = 0.1
 """Share of the instants at which a joint stands, above which these rows are looked at."""
 LONGEST = 10.0
@@ -53,12 +55,17 @@ def before_checks(model: GeneratedModel, samples: Samples, physical: PhysicalMod
     ]
 
 
-def _limits(model: GeneratedModel, key: str) -> Array | None:
+def limits_of(model: GeneratedModel, key: str) -> Array | None:
     """Largest |.| of each joint by the robot file, (n,); of q, (n, 2)."""
     given = dict(getattr(model, "LIMITS", {}) or {}).get(key)
     if given is None:
         return None
     return np.asarray(given, dtype=float)
+
+
+def still(samples: Samples) -> Array:
+    """Whether each joint stands still in the whole record, (n,)."""
+    return np.asarray(np.ptp(samples.q, axis=0) < STILL)
 
 
 def _per_joint(names: Sequence[int], values: Array, unit: Sequence[str], chosen: Array) -> str:
@@ -83,7 +90,7 @@ def positions(model: GeneratedModel, samples: Samples) -> Check:
     low, high = samples.q.min(axis=0), samples.q.max(axis=0)
     largest = np.maximum(-low, high)
     span = high - low
-    limits = _limits(model, "q")
+    limits = limits_of(model, "q")
     turning = np.array([unit == "rad" for unit in units])
     if limits is not None and limits.shape == (samples.n, 2):
         room = limits[:, 1] - limits[:, 0]
@@ -96,9 +103,10 @@ def positions(model: GeneratedModel, samples: Samples) -> Check:
         out, far = largest > bounds, largest > np.where(turning, TURNS[1], METRES[1])
         limit = f"{TURNS[0]:.3g} rad, {METRES[0]:g} m (no limits.q in the robot file)"
     if not out.any():
-        still = span < 1e-3
-        if still.any() and samples.n > 1:
-            text = f"Joints {', '.join(str(model.JOINTS[j]) for j in np.flatnonzero(still))} stand still in the whole record"
+        rests = np.flatnonzero(still(samples))
+        if len(rests) and samples.n > 1:
+            text = f"{'Joint' if len(rests) == 1 else 'Joints'} {', '.join(str(model.JOINTS[j]) for j in rests)} "
+            text += f"{'stands' if len(rests) == 1 else 'stand'} still in the whole record"
             return Check(question, "doubtful", text, limit, "look at the columns of these positions; their parameters cannot be identified")
         return Check(
             question, "good", f"They reach {_per_joint(model.JOINTS, largest, units, np.arange(samples.n) == np.argmax(largest))}", limit
@@ -120,7 +128,7 @@ def _against(
     model: GeneratedModel, samples: Samples, key: str, values: Array, sane: dict[str, tuple[float, float]], unit: str
 ) -> tuple[State, str, str]:
     units = [f"{one}/{unit}" for one in joint_units(model)]
-    limits = _limits(model, key)
+    limits = limits_of(model, key)
     if limits is not None and limits.shape == (samples.n,):
         out, far, limit = values > 1.5 * limits, values > 4 * limits, f"limits.{key} of the robot file"
     else:
@@ -129,6 +137,11 @@ def _against(
         limit = f"{sane['rad'][0]:g} rad/{unit}, {sane['m'][0]:g} m/{unit}"
     shown = out if out.any() else np.arange(samples.n) == int(np.argmax(values))
     return "no" if far.any() else "doubtful" if out.any() else "good", _per_joint(model.JOINTS, values, units, shown), limit
+
+
+def speed_bounds(units: Sequence[str]) -> Array:
+    """SPEEDS of joints in `units`, shape (n, 2)."""
+    return np.array([SPEEDS[unit] for unit in units])
 
 
 def speeds(model: GeneratedModel, samples: Samples) -> Check:
@@ -154,6 +167,11 @@ def accelerations(model: GeneratedModel, samples: Samples) -> Check:
     )
 
 
+def constant_torques(samples: Samples) -> Array:
+    """Whether the torque of each joint never changes, (n,)."""
+    return np.asarray(np.ptp(samples.tau, axis=0) <= 1e-9 * np.maximum(np.abs(samples.tau).max(axis=0), 1e-12))
+
+
 def torques(model: GeneratedModel, samples: Samples) -> Check:
     """Largest torque against limits.tau, where the robot file gives them; torques that never change."""
     question, remedy = (
@@ -161,11 +179,10 @@ def torques(model: GeneratedModel, samples: Samples) -> Check:
         "look at the unit, the side and the columns of the torques (record.units.tau, torque_side, columns.tau)",
     )
     largest = np.abs(samples.tau).max(axis=0)
-    flat = np.ptp(samples.tau, axis=0) <= 1e-9 * np.maximum(largest, 1e-12)
-    if flat.any():
+    if (flat := constant_torques(samples)).any():
         text = f"The torque of joint {', '.join(str(model.JOINTS[j]) for j in np.flatnonzero(flat))} is constant"
         return Check(question, "no", text, "torques that change", remedy)
-    limits = _limits(model, "tau")
+    limits = limits_of(model, "tau")
     limit = "limits.tau of the robot file"
     if limits is None or limits.shape != (samples.n,):
         return Check(question, "good", "They change on every joint; the robot file gives no limits.tau", limit)

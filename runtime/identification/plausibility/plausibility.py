@@ -17,13 +17,14 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.identification.checklist import WORST, Check, State
 from runtime.identification.plausibility.alternatives import times_of
-from runtime.identification.plausibility.before import REST, before_checks, times
+from runtime.identification.plausibility.before import REST, before_checks, constant_torques, still, times
 from runtime.identification.plausibility.continuous import searched
 from runtime.identification.plausibility.delay import CERTAIN, LONGEST, Delay, delay
 from runtime.identification.plausibility.excited import excited
 from runtime.identification.plausibility.gravity import Gravity, gravity_direction
 from runtime.identification.plausibility.known import KnownValues, known_values
 from runtime.identification.plausibility.samples import STANDING, Samples, excerpts, samples_of
+from runtime.identification.plausibility.through_time import change, cut_torques, jumps
 from runtime.identification.plausibility.trials import ALIKE, DECISIVE, Problem, Trial, decisive, problem_of, tried
 from runtime.model.compiled import text_of
 from runtime.model.generated import GeneratedModel, ModelText, joint_units
@@ -156,12 +157,21 @@ def plausibility(
     except InputError:
         physical = None
     motion = excited(model, whole, study)
-    checks += [*before_checks(model, samples, physical), rest(model, whole, study, samples), *([] if motion is None else [motion])]
+    checks += [jumps(model, whole, study), *before_checks(model, samples, physical), rest(model, whole, study, samples)]
+    checks += [] if motion is None else [motion]
     rows = samples.moving().sum(axis=0)
     enough = int(rows.sum()) > ROWS * len(model.BASE_PARAMETERS) and int(rows.min()) > FEWEST
-    if physical is None or not enough:
-        reason = "too few samples at which every joint moves" if not enough else "the model has no standard parameters"
+    flat = constant_torques(samples).any()
+    if physical is None or not enough or flat:
+        reason = (
+            "the model has no standard parameters"
+            if physical is None
+            else "a torque never changes"
+            if flat
+            else "too few samples at which every joint moves"
+        )
         return Plausibility((*checks, Check("Does physics agree?", "open", f"Not asked: {reason}")))
+    checks += [check for check in (cut_torques(model, whole, samples), change(model, samples)) if check is not None]
     sides = study.record[0].sides if study.record else ("joint", "joint")
     problem = problem_of(model, samples, variants, torque_side=sides[1])
     known = known_values(problem) if problem.barrier.near_values else None
@@ -245,7 +255,7 @@ def rest(model: GeneratedModel, records: Sequence[Record], study: Study, samples
 
 def standing_share(samples: Samples, study: Study) -> Array:
     """Share of the rows of each joint at which it stands, shape (n,)."""
-    speed = np.abs(samples.qd)
+    speed = np.where(still(samples), np.inf, np.abs(samples.qd))  # a joint that never moves is told as such
     used = speed >= np.asarray(study.rows.low_speed, dtype=float)
     standing = used & (speed <= samples.standing())
     return np.asarray(standing.sum(axis=0) / np.maximum(used.sum(axis=0), 1))
@@ -256,7 +266,7 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
     if standing_share(samples, study).max() <= REST:
         return None
     low = np.broadcast_to(np.asarray(study.rows.low_speed, dtype=float), (samples.n,))
-    wanted = tuple(float(f"{max(v, x):.1g}") for v, x in zip(samples.standing(), low, strict=True))
+    wanted = tuple(float(f"{max(v, x):.1g}") for v, x in zip(np.where(still(samples), 0.0, samples.standing()), low, strict=True))
     return max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
 
 
