@@ -49,7 +49,7 @@ from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.cestac import cestac, levels_of
 from runtime.resolution.perturbed import Task, perturbed_position, prepared
-from runtime.resolution.rounding import bits, stream
+from runtime.resolution.rounding import packed_bits, stream
 from runtime.resolution.run import NumpyWorkspace
 from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
@@ -115,15 +115,15 @@ def measure(title: str, module: GeneratedModel, record: Record, study: Study, na
 
 def stages(task: Task, work: CompiledWorkspace) -> dict[str, Callable[[], object]]:
     """The stages of a run in C, each on the arrays of the one before."""
-    (part, q, room), chosen = work.records[0], task.records[0].selection
-    states = kernels.FilteredStates(q, part.rate, chosen.signals, room)
+    (part, measured, room), chosen = work.records[0], task.records[0].selection
+    states = kernels.FilteredStates(measured, part.rate, chosen.signals, room)
     arguments = chosen.samples, chosen.factor, chosen.signals.decimate, work.constants, room
     y = kernels.decimated(work.entries, states, *arguments)
     rows = KeptRows(work.entries, [(y, part.torque, chosen.mask)], work.room)
 
     def draw_and_filter() -> kernels.FilteredStates:
-        up = bits(q.shape, stream(task.settings.seed, *KEY))
-        return kernels.FilteredStates(q, part.rate, chosen.signals, room, up=up, step=task.levels[0].delta)
+        up = packed_bits(part.q.size, stream(task.settings.seed, *KEY))
+        return kernels.FilteredStates(measured, part.rate, chosen.signals, room, up=up, step=task.levels[0].delta)
 
     return {
         "  C: draw, filters": draw_and_filter,

@@ -79,4 +79,9 @@ def signs(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
 def bits(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
     """1 or 0 with probability 1/2."""
     size = int(np.prod(shape))
-    return np.unpackbits(np.frombuffer(rng.bytes(-(-size // 8)), dtype=np.uint8), count=size).reshape(shape)
+    return np.unpackbits(packed_bits(size, rng), count=size).reshape(shape)
+
+
+def packed_bits(size: int, rng: np.random.Generator) -> Array:
+    """`size` random bits, the high ones of a byte first, and one byte more."""
+    return np.frombuffer(rng.bytes(-(-size // 8) + 1), dtype=np.uint8)

@@ -1,7 +1,7 @@
 """The C kernels of resolution studies (kernels.c), compiled on first use: filters, decimation and least squares around the signals of a robot in C.
 
-    FilteredStates(q, rate, signals, room)                  as runtime.observation.filters.filtered_states
-    SignalEntries(model, names)                                   which signals stand where in the wanted columns
+    FilteredStates(positions, rate, signals, room)          as runtime.observation.filters.filtered_states, of Positions(q, window, room)
+    SignalEntries(model, names)                             which signals stand where in the wanted columns
     decimated(entries, states, samples, ...)                kept samples of the wanted signals; the signals are not stored
 
 Least squares on these rows: `runtime.resolution.c.least_squares`.
@@ -25,8 +25,8 @@ from runtime.errors import InputError
 from runtime.model.compile_cache import FLAGS, NotCompiledError, cache_folder, shared_object
 from runtime.model.compiled import CompiledSignals
 from runtime.model.generated import GeneratedModel, constants_of
-from runtime.observation.decimation import Plan
 from runtime.observation.filters import butterworth, decimation_plan, median_filtered, require_longer
+from runtime.resolution.c.folding import STATE, folding_of
 from runtime.settings.study import Decimate, Lowpass
 from runtime.settings.study import Signals as SignalSettings
 
@@ -34,8 +34,8 @@ Array = np.ndarray
 
 SOURCE = Path(__file__).with_name("kernels.c")
 FUSED_FLAGS = tuple({"-O2": "-O3", "-ffp-contract=off": "-ffp-contract=fast"}.get(flag, flag) for flag in FLAGS)
-ABI = 2
-LANES, SIDE, SPAN, STATE = 8, 4, 512, 8  # of kernels.c; LANES is 1 without vector types
+ABI = 3
+LANES, SIDE, SPAN = 8, 4, 512  # of kernels.c; LANES is 1 without vector types
 TOGETHER = 640  # most samples of signals evaluated together, except where one block is longer: these stay in cache
 REFUSALS = {1: "arguments that do not fit each other", 2: "a block that the signals of the robot refuse"}
 
@@ -55,7 +55,7 @@ class StatesStructure(ctypes.Structure):
     """struct states."""
 
     _fields_ = [
-        *_fields("N n sample joint pad ends"),
+        *_fields("N n pad ends"),
         ("rate", ctypes.c_double),
         ("step", ctypes.c_double),
         ("on_q", LowpassStructure),
@@ -67,13 +67,17 @@ class StatesStructure(ctypes.Structure):
 class SourceStructure(ctypes.Structure):
     """struct source."""
 
-    _fields_ = [*_fields(pointers="signals constants"), *_fields("count S tile length", "wanted U rows")]
+    _fields_ = [*_fields(pointers="signals constants"), *_fields("count S tile length stride", "wanted U rows u")]
 
 
 class DecimationStructure(ctypes.Structure):
     """struct decimation."""
 
-    _fields_ = _fields("begin N phase L G blocks most first final rest ystride", "start block back end d x y")
+    _fields_ = [
+        *_fields("begin N phase factor G blocks most first final rest ystride"),
+        ("direct", ctypes.c_double),
+        *_fields(pointers="modes pairs start back end d x y"),
+    ]
 
 
 class EntriesStructure(ctypes.Structure):
@@ -156,31 +160,53 @@ def _lowpass(low: Lowpass | None, name: str, rate: float) -> tuple[LowpassStruct
     return LowpassStructure(len(sos), pad, address(sos), address(zi)), sos, zi
 
 
-class FilteredStates:
-    """q, qd, qdd of measured positions: median, low-pass, difference, low-pass, difference. As C keeps them, in `room`.
+class Positions:
+    """Positions as C reads them: joints side by side in groups of LANES, the last group filled up with zeros.
 
     Parameters
     ----------
     q : ndarray, shape (N, n), rad or m
+    window : int
+        Samples of the running median.
+    room : Room
+        Arrays that calls reuse: the next positions in this room take the place of these.
+    """
+
+    def __init__(self, q: Array, window: int, room: Room) -> None:
+        self.N, self.n = q.shape
+        self.lanes = room.array("given", -(-self.n // LANES), self.N, LANES)
+        self.lanes[-1] = 0
+        median = median_filtered(q, window)
+        for j, group in zip(range(0, self.n, LANES), self.lanes, strict=True):
+            group[:, : self.n - j] = median[:, j : j + LANES]
+
+
+class FilteredStates:
+    """q, qd, qdd of measured positions: low-pass, difference, low-pass, difference. As C keeps them, in `room`.
+
+    Parameters
+    ----------
+    positions : Positions
     rate : float, Hz
     signals : SignalSettings
     room : Room
-    up : ndarray of uint8, shape (N, n), optional
-        Moves q, after the median alone, by +step where it is 1 and by -step where it is 0.
+    up : ndarray of uint8, optional
+        Bits as `runtime.resolution.rounding.packed_bits` gives them: bit t*n + j moves position t of joint j, by +step where it is 1, else by -step.
     step : float, rad or m
     """
 
-    def __init__(self, q: Array, rate: float, signals: SignalSettings, room: Room, *, up: Array | None = None, step: float = 0.0) -> None:
-        given = np.asarray(median_filtered(q, signals.median), dtype=float)
-        self.N, self.n = given.shape
+    def __init__(
+        self, positions: Positions, rate: float, signals: SignalSettings, room: Room, *, up: Array | None = None, step: float = 0.0
+    ) -> None:
+        self.N, self.n = positions.N, positions.n
         (on_q, *_), (on_qd, *_) = (_lowpass(signals.lowpass, name, rate) for name in ("q", "qd"))
         pad, ends = max(on_q.pad, on_qd.pad), 1 if signals.ends == "one-sided" else 2
         require_longer(self.N, max(pad, ends))
-        groups = -(-self.n // LANES)
-        lanes = room.array("lanes", 3, groups, self.N + 2 * pad, LANES)
-        steps = [step // given.itemsize for step in given.strides]
-        pointers = address(given), None if up is None else address(up), *map(address, lanes)
-        self.lanes, self.structure = lanes, StatesStructure(self.N, self.n, *steps, pad, ends, rate, step, on_q, on_qd, *pointers)
+        if up is not None and up.size <= -(-self.N * self.n // 8):
+            raise InputError(f"{up.size} bytes for {self.N * self.n} bits; expected one byte more than these fill")
+        lanes = room.array("lanes", 3, len(positions.lanes), self.N + 2 * pad, LANES)
+        pointers = address(positions.lanes), None if up is None else address(up), *map(address, lanes)
+        self.lanes, self.structure = lanes, StatesStructure(self.N, self.n, pad, ends, rate, step, on_q, on_qd, *pointers)
         call("states", ctypes.byref(self.structure))
 
     def rows(self, samples: slice) -> Array:
@@ -201,6 +227,8 @@ class SignalEntries:
         By joint, positions in `names` of its entries; `place` the same by entry.
     wanted : ndarray
         Signals that occur.
+    whole_groups : ndarray
+        The same, the last one repeated up to a multiple of LANES.
     number : ndarray
         Position in `wanted` of the signal of each entry.
     table : SignalTable
@@ -221,6 +249,7 @@ class SignalEntries:
         self.place: Array = place[order]
         self.sign = np.ascontiguousarray(table.sign[order], dtype=float)
         self.wanted, number = np.unique(table.signal[order].astype(np.int32), return_inverse=True)
+        self.whole_groups = np.pad(self.wanted, (0, -len(self.wanted) % LANES), mode="edge")
         self.number: Array = number.reshape(-1).astype(np.int32)
         self.table = table if len(self.wanted) == table.count else model.signals_alone(self.wanted.tolist())
 
@@ -228,18 +257,6 @@ class SignalEntries:
 def constant_values(model: CompiledSignals, constants: Mapping[str, float]) -> Array:
     """Geometry and gravity in the order of CONSTANTS, some of them in place of the robot file's."""
     return np.array([*constants_of(cast(GeneratedModel, model), constants).values()] or [0.0], dtype=float)
-
-
-@lru_cache(maxsize=8)
-def _matrices(p: Plan) -> tuple[Array, Array, Array, Array]:
-    """start, block, back and end of kernels.c: products of the plan with those of the state below, outputs filled up to whole states."""
-    step = np.kron(np.diag(p.step.real), np.eye(2)) + np.kron(np.diag(p.step.imag), np.array([[0.0, 1.0], [-1.0, 0.0]]))
-    block, back, end = np.zeros((p.L + STATE, 3 * STATE)), np.zeros((STATE, 2 * STATE)), np.zeros((len(p.A) + STATE, 2 * STATE))
-    block[: p.L, : p.PQY.shape[1]] = p.PQY
-    block[p.L :, : 2 * STATE + p.G] = np.hstack([step, p.Mx, p.Yx])
-    back[:, : STATE + p.G] = np.hstack([step, p.Yv])
-    end[:, : p.A.shape[1]] = np.vstack([p.A, p.Ax])
-    return np.ascontiguousarray(p.X0), block, back, end
 
 
 def decimated(
@@ -252,17 +269,20 @@ def decimated(
     p = decimation_plan(samples.stop - samples.start, factor, settings)
     if p is None:
         return _every_sample(entries, states, samples, constants, room)
-    table, S = entries.table, len(entries.wanted)
+    table, folding, wanted = entries.table, folding_of(p), entries.whole_groups
+    S = len(wanted)
     most = _blocks_together(p.L, table.tile)
-    length = -(-max(len(p.X0), len(p.A), p.L * most) // table.tile) * table.tile
-    U, rows = room.array("U", table.count * length), room.array("rows", 3, states.n, table.tile)
+    length = max(len(p.X0), len(p.A), p.L * most)
+    U, rows = room.array("U", table.count, table.tile), room.array("rows", 3, states.n, table.tile)
+    u = room.array("u", S, length + 2 * LANES)
     y, d, x = room.array("y", S, p.K), room.array("d", p.blocks, S, 2 * STATE), room.array("x", S, STATE)
-    numbers = table.count, S, table.tile, length
-    source = SourceStructure(table.address, address(constants), *numbers, *map(address, (entries.wanted, U, rows)))
+    numbers = table.count, S, table.tile, length, u.shape[1]
+    source = SourceStructure(table.address, address(constants), *numbers, *map(address, (wanted, U, rows)), address(u) + 8 * LANES)
     sizes = p.blocks, most, len(p.X0), len(p.A), p.K - p.blocks * p.G, p.K
-    plan = DecimationStructure(samples.start, p.N, p.phase, p.L, p.G, *sizes, *map(address, (*_matrices(p), d, x, y)))
+    pointers = map(address, (*folding.matrices, d, x, y))
+    plan = DecimationStructure(samples.start, p.N, p.phase, p.factor, p.G, *sizes, folding.direct, *pointers)
     call("decimated", *map(ctypes.byref, (states.structure, source, plan)))
-    return y
+    return y[: len(entries.wanted)]
 
 
 def _blocks_together(L: int, tile: int) -> int:
@@ -273,7 +293,7 @@ def _blocks_together(L: int, tile: int) -> int:
 def _every_sample(entries: SignalEntries, states: FilteredStates, samples: slice, constants: Array, room: Room) -> Array:
     """The wanted signals at all samples, shape (S, N)."""
     N, table = samples.stop - samples.start, entries.table
-    U, rows = room.array("U", table.count, N), states.rows(samples)
+    U, rows = room.array("every", table.count, N), states.rows(samples)
     pointers = [ctypes.c_void_p(address(x)) for x in (*rows, constants, U)]
     size = ctypes.c_int64(N)
     if ctypes.CFUNCTYPE(ctypes.c_int32)(table.address)(size, *pointers[:3], size, *pointers[3:], size):

@@ -41,7 +41,7 @@ def _agree() -> bool:
     model = _model(cast(int, ctypes.cast(callback, ctypes.c_void_p).value))
     entries = fused.SignalEntries(model, model.BASE_PARAMETERS)
     expected = filtered_states(q, RATE, SETTINGS)
-    states = fused.FilteredStates(q, RATE, SETTINGS, room)
+    states = fused.FilteredStates(fused.Positions(q, 1, room), RATE, SETTINGS, room)
     y = fused.decimated(entries, states, slice(0, N), 3, SETTINGS.decimate, np.zeros(1), room)
     u = decimated(np.vstack([expected.q.T, np.ones(N)]), 3, SETTINGS.decimate)
     K = u.shape[1]

@@ -22,7 +22,7 @@ from runtime.resolution.c import kernels
 from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.self_test import unavailable
 from runtime.resolution.perturbed import PreparedRecord, Task, run_position, stream_keys, torque_rows
-from runtime.resolution.rounding import bits, stream
+from runtime.resolution.rounding import packed_bits, stream
 from runtime.resolution.runs import Level
 
 Array = np.ndarray
@@ -53,7 +53,7 @@ class CompiledWorkspace:
         self.task, self.compiled, self.entries = task, model, kernels.SignalEntries(model, task.names)
         self.constants = kernels.constant_values(model, task.constants)
         self.room = kernels.Room()
-        self.records = [(record, np.asfortranarray(record.q), kernels.Room()) for record in task.records]
+        self.records = [(record, self._positions(record, record.q, kernels.Room()), kernels.Room()) for record in task.records]
         self.two_point = task.settings.rounding == "two-point" and (task.settings.side == "joint" or task.drives is None)
 
     @property
@@ -69,27 +69,35 @@ class CompiledWorkspace:
     def fit(self, level: Level, draw: tuple[int, ...]) -> LeastSquares:
         """Ordinary least squares of Y on W_CESTAC of one draw, eq. (17)."""
         rows = []
-        for k, (record, q, room) in enumerate(self.records):
+        for k, (record, measured, room) in enumerate(self.records):
             position, torque = stream_keys(draw, k)
-            y = self._signals(record, self._states(record, q, level, position, room), room)
+            y = self._signals(record, self._states(record, measured, level, position, room), room)
             rows.append((y, torque_rows(self.task, record, level, torque), record.selection.mask))
         return least_squares(KeptRows(self.entries, rows, self.room))
 
     def moved_fit(self, errors: Sequence[Array]) -> LeastSquares:
         """The same with the positions of every record moved by `errors`, shape (N, n) each, torques as measured."""
         rows = []
-        for (record, q, room), error in zip(self.records, errors, strict=True):
-            states = kernels.FilteredStates(q + error, record.rate, record.selection.signals, room)
+        for (record, _, room), error in zip(self.records, errors, strict=True):
+            moved = self._positions(record, record.q + error, room)
+            states = kernels.FilteredStates(moved, record.rate, record.selection.signals, room)
             rows.append((self._signals(record, states, room), record.torque, record.selection.mask))
         return least_squares(KeptRows(self.entries, rows, self.room))
 
-    def _states(self, record: PreparedRecord, q: Array, level: Level, key: tuple[int, ...], room: kernels.Room) -> kernels.FilteredStates:
+    def _positions(self, record: PreparedRecord, q: Array, room: kernels.Room) -> kernels.Positions:
+        """Positions q, shape (N, n), as C reads them."""
+        return kernels.Positions(q, record.selection.signals.median, room)
+
+    def _states(
+        self, record: PreparedRecord, measured: kernels.Positions, level: Level, key: tuple[int, ...], room: kernels.Room
+    ) -> kernels.FilteredStates:
         """States of one draw."""
-        settings, selection = self.task.settings, record.selection
-        if self.two_point and level.delta and selection.signals.median == 1:  # the sum is left to C
-            up = bits(q.shape, stream(settings.seed, *key))
-            return kernels.FilteredStates(q, record.rate, selection.signals, room, up=up, step=level.delta)
-        return kernels.FilteredStates(run_position(self.task, record, level, key), record.rate, selection.signals, room)
+        settings, signals = self.task.settings, record.selection.signals
+        if self.two_point and level.delta and signals.median == 1:  # the sum is left to C
+            up = packed_bits(record.q.size, stream(settings.seed, *key))
+            return kernels.FilteredStates(measured, record.rate, signals, room, up=up, step=level.delta)
+        drawn = self._positions(record, run_position(self.task, record, level, key), room)
+        return kernels.FilteredStates(drawn, record.rate, signals, room)
 
     def _signals(self, record: PreparedRecord, states: kernels.FilteredStates, room: kernels.Room) -> Array:
         """Distinct signals of the wanted columns at the kept samples, shape (S, K)."""
