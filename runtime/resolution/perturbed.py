@@ -137,8 +137,8 @@ def prepared(
     if counts is None:
         require_positions(record.missing, "reader: lowpass", record.file, COUNTS)
     if part is None:
-        states = counts or filtered_states(record.q, record.rate, signals)
-        selection = select_rows(record, states.qd, signals, study.rows)
+        states = counts or (filtered_states(record.q, record.rate, signals) if np.any(study.rows.low_speed) else None)
+        selection = select_rows(record, record.q if states is None else states.qd, signals, study.rows)  # without a limit any speed will do
         torque = decimated_torque(record.tau, selection)
     else:
         selection, torque = part.selection, part.torque

@@ -55,7 +55,7 @@ class Verbs(TyperGroup):
         super().format_help(ctx, formatter)
 
 
-ALLOCATIONS = 100_000
+ALLOCATIONS = 500_000
 """New objects between two searches for unreachable ones. Most objects of modules and figures stay: seeking among them takes a tenth of a report."""
 
 app = typer.Typer(

@@ -159,7 +159,8 @@ def demonstrate(prepared: Prepared, *, quick: bool, progress: Callable[[str], No
     if quick:
         return Demonstration(prepared, result, main, None, None, {}, {})
     progress("curve of %e against resolution")
-    curve = resolution(study, delta=SWEEP)
+    further = resolution(study, delta=tuple(step for step in SWEEP if step not in chapter.DELTA))
+    curve = replace(main, levels=(*main.levels, *further.levels))
     progress("torque resolution")
     torque = resolution(study, delta=chapter.DELTA[:1], torque=chapter.PHI)
     combinations = {"essential, two-point, joint side, no median, 50 Hz (the defaults)": main}

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
 from runtime.errors import InputError
-from runtime.identification.plausibility.fits import solved
+from runtime.identification.plausibility.fits import Grams, solved
 from runtime.identification.plausibility.samples import STANDING, motion_cutoff
 from runtime.model.generated import GeneratedModel
 from runtime.observation.filters import Lowpass, filtered_states, lowpass_filtered, median_filtered
@@ -181,14 +181,12 @@ class _Problem:
     def fit(self, shift: Array) -> tuple[Array, Array, Array]:
         """X, sigma by joint, and the residuals, shape (K, n)."""
         Y = self.shifted(shift)
-        sigma = np.sqrt(np.maximum((Y**2 * self.mask).sum(axis=0), 1e-300) / np.maximum(self.mask.sum(axis=0), 1))
+        grams, rows = Grams.of(self.D, Y, self.mask), np.maximum(self.mask.sum(axis=0), 1)
+        sigma = np.sqrt(np.maximum(grams.measured, 1e-300) / rows)
         for _ in range(4):
-            w = self.mask / sigma
-            A = (self.D * w[:, :, None]).reshape(-1, self.b)
-            X = solved(A.T @ A, A.T @ (Y * w).ravel())
-            e = (Y - self.D @ X) * self.mask
-            sigma = np.maximum(np.sqrt((e**2).sum(axis=0) / np.maximum(self.mask.sum(axis=0), 1)), 1e-6 * sigma)
-        return X, sigma, e
+            X = solved(*grams.weighted(sigma))
+            sigma = np.maximum(np.sqrt(grams.squares(X) / rows), 1e-6 * sigma)
+        return X, sigma, (Y - self.D @ X) * self.mask
 
     def misfit(self, shift: Array) -> float:
         """Sum of log sigma over the joints."""
@@ -208,16 +206,17 @@ class _Problem:
         Z = np.zeros((K, n, b + n))
         Z[:, :, :b] = self.D * w[:, :, None]
         Z[:, np.arange(n), b + np.arange(n)] = slope
-        A = np.einsum("kja,kjb->ab", Z, Z)
+        columns = Z.reshape(-1, b + n)
+        A = columns.T @ columns
         scale = np.sqrt(np.diag(A))
         scale = np.where(scale > 0, scale, 1.0)
         inverse = np.linalg.pinv(A / np.outer(scale, scale), rcond=1e-10, hermitian=True) / np.outer(scale, scale)
         r = e / sigma
-        x = inverse @ np.einsum("kja,kj->a", Z, r)
+        x = inverse @ (columns.T @ r.ravel())
         rows = int(self.mask.sum())
         share = self.alike * rows / max(rows - b - n, 1)
         blocks = np.array_split(np.arange(K), min(BLOCKS, K))
-        g = np.array([np.einsum("kja,kj->a", Z[k], r[k]) for k in blocks])
+        g = np.array([np.tensordot(r[k], Z[k], axes=2) for k in blocks])
         between = inverse @ (g.T @ g) @ inverse * share * len(blocks) / (len(blocks) - 1)
         deviation = np.sqrt(np.maximum(np.diag(inverse) * share, np.diag(between)))[b:]
         seen = (slope**2).sum(axis=0) > 1e-6

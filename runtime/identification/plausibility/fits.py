@@ -186,6 +186,7 @@ class Barrier:
             self.heavy[numbers[-1]] = 0.0 if known else HEAVY / mass
         self.unit = np.linalg.inv(P0) if links else P0
         self.volume = np.linalg.slogdet(P0)[1]
+        self.pull = np.einsum("kab,lba->lk", self.B, self.unit)
         self.start = self._start(P0)
 
     def _near_values(self, P0: Array, length: float) -> None:
@@ -262,7 +263,7 @@ class Barrier:
         gradient, H = self.heavy.copy(), np.zeros((self.p, self.p))
         inverse = np.linalg.inv(np.einsum("lk,kab->lab", chi[self.place], self.B))
         T = np.einsum("lab,kbc->lkac", inverse, self.B)
-        slope = np.einsum("kab,lba->lk", self.B, self.unit) - np.einsum("lkaa->lk", T)
+        slope = self.pull - np.einsum("lkaa->lk", T)
         gradient[self.place] += of_links[:, None] * slope  # no parameter belongs to two links
         H[self.place[:, :, None], self.place[:, None, :]] = of_links[:, None, None] * np.einsum("lkab,lmba->lkm", T, T)
         c = self.rows @ chi
