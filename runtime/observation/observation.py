@@ -218,18 +218,14 @@ def _observed_by_blocks(
 
     A record is read once; twice where rows are left out by speed, since their number is needed first.
     """
-    wholes = [instants_of(stream, study) for stream in streams]
-    cut = [pieces(k, stream, study.signals, whole) for k, (stream, whole) in enumerate(zip(streams, wholes, strict=True))]
-    every = [piece for own in cut for piece in own]
+    records = [(k, stream, instants_of(stream, study)) for k, stream in enumerate(streams)]
+    every = [piece for k, stream, whole in records for piece in pieces(k, stream, study.signals, whole)]
     task = BlockTask(model, tuple(streams), study, constants).with_starts(every)
-    if task.filters_choose:
-        counted = dict(zip(every, in_order(row_counts, task, every, workers), strict=True))
-    else:
-        cut_whole = [Piece(k, 0, len(stream), whole, ()) for k, (stream, whole) in enumerate(zip(streams, wholes, strict=True))]
-        counted = {piece: row_counts(task, piece) for piece in cut_whole}
+    asked = every if task.filters_choose else [Piece(k, 0, len(stream), whole, ()) for k, stream, whole in records]
+    counted = list(zip(asked, in_order(row_counts, task, asked, workers), strict=True))
     layouts = [
-        Layout.of(stream, study, whole, [part for piece, part in counted.items() if piece.record == k], task.skimmed.get(k))
-        for k, (stream, whole) in enumerate(zip(streams, wholes, strict=True))
+        Layout.of(stream, study, whole, [part for piece, part in counted if piece.record == k], task.skimmed.get(k))
+        for k, stream, whole in records
     ]
     counts = np.array([at.rows for at in layouts])
     names, columns = tuple(model.BASE_PARAMETERS), task.columns
@@ -237,7 +233,7 @@ def _observed_by_blocks(
     if needed_by and not held:
         raise rows_reduced(needed_by)
     rows = tuple(counts.sum(axis=0).tolist())
-    rate = max(stream.rate / whole.factor for stream, whole in zip(streams, wholes, strict=True))
+    rate = max(stream.rate / whole.factor for _, stream, whole in records)
     span = min(at.t0 for at in layouts), max(at.t1 for at in layouts)
     cuts = tuple(windows if windows is not None else study.validate.split or halves(*span))
     length = float(study.estimate.options.get("block") or default_block(rows, rate))
@@ -249,7 +245,7 @@ def _observed_by_blocks(
             kept.take(piece.record, *block)
         if own is not None:
             factors[piece.record].join(own)
-    settings = same_settings([_settings(study.signals, study.rows, whole.factor) for whole in wholes])
+    settings = same_settings([_settings(study.signals, study.rows, whole.factor) for *_, whole in records])
     observation = Observation(
         W=kept.transposed.T,
         Y=kept.Y,
