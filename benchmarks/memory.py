@@ -11,8 +11,8 @@ Rounds of the small record enclose the large one. The limit is 600 MB at 10 mill
 of 65536 samples, each decimated by scipy column by column, lstsq of all rows; CPU time of the small record, from an .npz.
 
 With --workers instead: the large record by one process and by so many, in turn, on all cores: wall time, CPU time and peak memory of the process that
-asks and of the largest of the others, and whether all results agree in every byte. Wall time needs a quiet machine; beside it stands what the CPU times
-would give, the one process plus an equal share of the others.
+asks, which is one of them, and of the others with those that read the file, and whether all results agree in every byte. Wall time needs a quiet machine;
+beside it stands what the CPU times allow at most: all of one over an equal share of all of several.
 """
 
 # ruff: noqa: E402
@@ -174,8 +174,8 @@ def by_workers(record: Path, reader: str, workers: int, rounds: int) -> None:
             f"workers {count}: wall {wall} s, CPU {cpu} s, others {others} s; peak {memory[0]:.0f} MB, largest other process {memory[1]:.0f} MB"
         )
     ratios = [one["wall"] / several["wall"] for one, several in done]
-    predicted = [(a["s"] + a["others"]["s"]) / (b["s"] + b["others"]["s"] / workers) for a, b in done]
-    for name, row in (("wall", ratios), ("by CPU time", predicted)):
+    most = [workers * (a["s"] + a["others"]["s"]) / (b["s"] + b["others"]["s"]) for a, b in done]
+    for name, row in (("wall", ratios), ("at most, by CPU time", most)):
         print(f"one over {workers}, {name}: {statistics.median(row):.2f} [{min(row):.2f}, {max(row):.2f}]")
     print(f"same bytes: {len({run['text'] for pair in done for run in pair}) == 1}, load at the end {os.getloadavg()[0]:.1f}")
 

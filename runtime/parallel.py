@@ -42,7 +42,7 @@ class Workers:
     The others are spawned when they are first needed, or by `start`; they serve all tasks until the context ends, and end with this process.
 
         with Workers(2) as workers:
-            workers.start("runtime.observation.by_blocks")
+            workers.start("numpy")
             ...
             for result in results(task, context, keys, workers):
 
@@ -214,8 +214,9 @@ def _shared(task: Callable[[C, K], R], context: C, keys: Iterable[K], workers: W
                     if left or lost:
                         other.work(task, context, (lost, left), done)
                     continue
-                if error is not None or item is None:
-                    raise error or RuntimeError("no result")
+                if error is not None:
+                    raise error
+                assert item is not None
                 other.deaths = 0
             unfinished -= 1
             yield item[0], result
