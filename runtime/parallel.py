@@ -24,7 +24,7 @@ from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
-from runtime.blas import inherited_single_thread
+from runtime.blas import inherited_single_thread, single_thread
 from runtime.cluster import PATIENCE, TIMEOUT, died, on_cluster
 from runtime.errors import InputError
 
@@ -189,19 +189,17 @@ def started(workers: int | Workers) -> Iterator[Workers]:
 
 def _shared(task: Callable[[C, K], R], context: C, keys: Iterable[K], workers: Workers) -> Iterator[tuple[int, R]]:
     """Number and result of every key as they finish. A key whose process died is left to the other ones: it might end this one too."""
-    from threadpoolctl import ThreadpoolController
-
     left: deque[Item] = deque(enumerate(keys))
     lost: deque[Item] = deque()
     done: SimpleQueue[tuple[OtherProcess, Item | None, Any, BaseException | None]] = SimpleQueue()
     others, unfinished = workers.others[: max(len(left) - 1, 0)], len(left)
-    libraries = ThreadpoolController()  # sought once: that takes a sixth of a short run
+    single = single_thread()
     try:
         for other in others:
             other.work(task, context, (lost, left), done)
         while unfinished:
             if done.empty() and (item := _next(left)) is not None:
-                with libraries.limit(limits=1, user_api="blas"):
+                with single():
                     result = task(context, item[1])
             else:
                 other, item, result, error = done.get()
