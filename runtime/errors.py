@@ -154,3 +154,8 @@ def _problem(error: Mapping[str, Any], given: Any) -> tuple[tuple[str | int, ...
     elif kind not in EXPECTED:
         reason = error["msg"].removeprefix("Value error, ")
     return tuple(path), reason
+
+
+def instant(t: float) -> str:
+    """A time, s, for messages: six digits; to the millisecond where it counts from an epoch, or two instants of a record would read alike."""
+    return f"{t:g}" if abs(t) < 1e5 else f"{t:.3f}"

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from runtime.errors import InputError
+from runtime.errors import InputError, instant
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.methods import estimate_of, linear_companion, linear_system, point_estimate
 from runtime.estimators.solution import unit_columns
@@ -218,7 +218,7 @@ def split_validation(
     """`cross_validation` between windows in s of one record: the first is fitted, the others are predicted."""
     if len(windows) < 2:
         raise InputError(f"{len(windows)} window; expected at least two, the first to fit, the others to predict (validate.split)")
-    labels = [f"[{'' if t0 is None else f'{t0:g}'}, {'' if t1 is None else f'{t1:g}'}] s" for t0, t1 in windows]
+    labels = [f"[{', '.join('' if t is None else instant(t) for t in window)}] s" for window in windows]
     parts = {label: observation.between(t0, t1) for label, (t0, t1) in zip(labels, windows, strict=True)}
     first = labels[0]
     others = {label: part for label, part in parts.items() if label != first}

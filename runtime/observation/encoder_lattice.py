@@ -181,7 +181,7 @@ class Unwrapping:
     def findings(self) -> tuple[str, ...]:
         """What wrapped, a sentence for each encoder."""
         return tuple(
-            f"encoder {j + 1}: the count wraps at 2^{int(np.log2(wrap))} {times} times; it was unwrapped"
+            f"encoder {j + 1}: the count wraps at 2^{int(np.log2(wrap))} {times} times; it was unwrapped from the first sample on, whose turn the zero of the joint must suit"
             for j, (wrap, times) in sorted(self.wraps.items())
         )
 

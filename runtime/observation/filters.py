@@ -125,6 +125,10 @@ def derivative(x: Array, rate: float, ends: str = "one-sided") -> Array:
     return np.asarray(np.gradient(x, 1 / rate, axis=0, edge_order=1 if ends == "one-sided" else 2))
 
 
+CLOCK = 1e-6
+"""Relative error of a rate that comes from a time column: 20 stays 20."""
+
+
 def decimation_factor(signals: Signals, rate: float) -> int:
     """n_d = 0.8 ws/(2 wf), eq. (13), rounded down so that the band up to wf is kept; 1 without decimation."""
     if signals.decimate is None:
@@ -133,7 +137,7 @@ def decimation_factor(signals: Signals, rate: float) -> int:
         return signals.decimate.factor
     if signals.lowpass is None:
         raise InputError("signals.decimate.factor is auto but there is no low-pass to take the cut-off from, eq. (13); give a number")
-    return max(1, floor(CUTOFF * rate / (2 * signals.lowpass.cutoff) + 1e-9))
+    return max(1, floor(CUTOFF * rate / (2 * signals.lowpass.cutoff) * (1 + CLOCK)))
 
 
 def kept_samples(N: int, factor: int, phase: str) -> Array:

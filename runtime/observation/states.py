@@ -16,9 +16,11 @@ from runtime.errors import SettingsError
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, drives_of
 from runtime.observation.counts import Reading, read_counts
+from runtime.observation.encoder_lattice import Unwrapping, lattice
 from runtime.observation.filters import SpeedErrors, States, filtered_states
 from runtime.observation.sign_errors import switches
 from runtime.records.missing import COUNTS, Missing, require_positions
+from runtime.records.record import Record
 from runtime.settings.study import Signals
 
 Array = np.ndarray
@@ -68,6 +70,20 @@ def observed_states(
     position = encoder_position(q, drives, None if missing is None else missing.at_encoders(drives))
     reading = read_counts(position, rate, signals.step, lines=signals.lines, name=name)
     return replace(joint_states(reading, rate, signals, drives), findings=sentences(reading.findings, name))
+
+
+def unwrapped(model: GeneratedModel, record: Record, signals: Signals) -> Record:
+    """The record as reader counts takes it: counts that start anew after a turn of the counter go on; another reader leaves it as it is."""
+    if signals.reader != "counts":
+        return record
+    drives = encoder_drives(model, signals)
+    position = encoder_position(record.q, drives)
+    known, unwrapping = lattice(position, signals.step, name=record.name), Unwrapping(record.n, record.name)
+    counts = unwrapping(known.counts(position))
+    if not unwrapping.wraps:
+        return record
+    x = known.position(counts)
+    return replace(record, q=x if drives is None else drives.joint_position(x))
 
 
 def sentences(findings: Iterable[str], name: str) -> tuple[str, ...]:

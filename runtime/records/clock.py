@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime.errors import InputError
+from runtime.errors import InputError, instant
 from runtime.records.remedies import remedies
 from runtime.records.time_stamps import time_stamps
 
@@ -74,7 +74,9 @@ def clock(stamps: Stamps, blocks: Callable[[], Iterable[Array]]) -> float:
         if (step <= 0).any():
             i = int(np.argmax(step <= 0))
             after = i + len(t) - len(step)
-            raise stamps.error(f"time goes from {t[after] - step[i]:g} s to {t[after]:g} s; expected increasing time", N + after)
+            raise stamps.error(
+                f"time goes from {instant(t[after] - step[i])} s to {instant(t[after])} s; expected increasing time", N + after
+            )
         first, last, N = (float(t[0]) if N == 0 else first), float(t[-1]), N + len(t)
     if N < 2:
         raise InputError(f"{N} samples; a record needs more", file=stamps.file)

@@ -378,6 +378,10 @@ NAMES = "t;q1;q2;tau1;tau2\n"
         ),
         (NAMES + "ms;deg;deg;mA;mA\n0;0;0;0;0\n", "line 2: 'ms'; expected a number; put # before a second line of names or units"),
         (
+            NAMES + "10:00:00;0;0;0;0\n",
+            "line 2: '10:00:00'; expected a number; no date or time of day is read: write seconds, or give record.rate",
+        ),
+        (
             "Log of cell\n" + NAMES + "0;0;0;0;0\n",
             "line 2: 1 fields; expected 3 (Log, of, cell); put # before lines that are neither names nor numbers",
         ),
@@ -389,6 +393,18 @@ def test_logs_as_offices_write_them(tmp_path, text, said):
     with pytest.raises(InputError) as e:
         read_record(settings(files="log.csv"), folder=tmp_path)
     assert said in str(e.value)
+
+
+def test_a_title_of_as_many_words_as_columns_is_told(tmp_path):
+    (tmp_path / "log.csv").write_text("Log of the cell and\nt q1 q2 tau1 tau2\n0 0 0 0 0\n")
+    with pytest.raises(InputError, match="the first line has Log, of, the, cell, and; put # before lines above the names"):
+        read_record(settings(files="log.csv", columns={"t": "t", "q": ["q1", "q2"], "tau": ["tau1", "tau2"]}), folder=tmp_path)
+
+
+def test_separators_of_thousands_are_no_decimals(tmp_path):
+    (tmp_path / "log.csv").write_text(NAMES + "0,0;1.234;0;0;0\n0,1;1.235;0;0;0\n")
+    with pytest.raises(InputError, match=r"column 'q1', line 2: '1.234' holds a point, .* without separators of thousands"):
+        read_record(settings(files="log.csv", decimal=","), folder=tmp_path)
 
 
 def test_a_log_of_another_encoding_says_how_to_save_it(tmp_path):

@@ -115,6 +115,7 @@ def test_phases(N, factor):
 def test_equation_13():
     assert decimation_factor(Signals(), 5000.0) == 40  # 0.8*5000/(2*50)
     assert decimation_factor(Signals(lowpass=Lowpass(cutoff=60)), 5000.0) == 33  # rounded down: the band is kept
+    assert decimation_factor(Signals(), 4999.9999) == 40  # the rate of a time column that counts from an epoch
     assert decimation_factor(Signals(), 100.5) == 1
     assert decimation_factor(Signals(decimate=Decimate(factor=7)), 5000.0) == 7
     assert decimation_factor(Signals(decimate=None), 5000.0) == 1

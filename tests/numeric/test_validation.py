@@ -63,6 +63,9 @@ def test_windows_of_one_record():
     found = estimate_of(seen.between(0, 5))
     late = seen.between(5.01, None)
     assert np.isclose(result.predictions[1].relative_error, 100 * np.linalg.norm(late.Y - late.W @ found.X) / np.linalg.norm(late.Y))
+    epoch = replace(seen, t=seen.t + 1.795e9)
+    parts = [p.part for p in split_validation(epoch, [(1.795e9, 1.795e9 + 5), (1.795e9 + 5.01, None)], {"all": OLS}).predictions]
+    assert parts == ["[1795000000.000, 1795000005.000] s", "[1795000005.010, ] s"]
     with pytest.raises(InputError, match="at least two"):
         split_validation(seen, [(0, 5)], {"all": OLS})
 

@@ -30,6 +30,7 @@ from runtime.model.compiled import text_of
 from runtime.model.generated import GeneratedModel, ModelText, joint_units
 from runtime.model.inertia import physical_model
 from runtime.observation.observation import observe
+from runtime.observation.states import unwrapped
 from runtime.progress import at
 from runtime.records.record import Record
 from runtime.records.stream import Stream
@@ -145,6 +146,7 @@ def plausibility(
     checks = [times(several)]
     whole = [part for record in several for part in ([record] if isinstance(record, Record) else excerpts(record, study))]
     try:
+        whole = [unwrapped(model, record, study.signals) for record in whole]
         samples = samples_of(whole, study)
     except InputError as e:
         return Plausibility((*checks, Check("Do record and robot file suit each other?", "open", f"Not asked: {e.message}")))

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from runtime.errors import instant
 from runtime.identification.checklist import Check, State
 from runtime.identification.plausibility.before import limits_of, speed_bounds
 from runtime.identification.plausibility.fits import Grams, least_squares
@@ -56,18 +57,24 @@ def jumps(model: GeneratedModel, records: Sequence[Record], study: Study) -> Che
         k = int(np.flatnonzero(high.any(axis=1))[0])
         joints = np.flatnonzero(high[k])
         text = f"{'Joint' if len(joints) == 1 else 'Joints'} {', '.join(str(model.JOINTS[j]) for j in joints)} "
-        text += f"{'jumps' if len(joints) == 1 else 'jump'} by {', '.join(f'{steps[k, j]:.3g} {units[j]}' for j in joints)} at {record.t[k]:.4g} s"
+        text += f"{'jumps' if len(joints) == 1 else 'jump'} by {', '.join(f'{steps[k, j]:.3g} {units[j]}' for j in joints)} at {instant(record.t[k])} s"
         if more := int(np.count_nonzero(np.diff(np.flatnonzero(high.any(axis=1))) > study.signals.median)):
             text += f", and at {more} more {'instant' if more == 1 else 'instants'}"
-        turns = all(units[j] == "rad" and abs(steps[k, j] - 2 * np.pi) < 0.1 for j in joints)
-        if turns:
-            remedy = "unwrap these angles: they start anew after a turn"
+        if _wrap(steps, high, usual):
+            remedy = "it wraps: unwrap it, or record counts and let signals: {reader: counts} do so"
         elif len(joints) == len(units):
             remedy = "samples are missing there, or two records are joined: give each its own file (record.also), or cut (rows.window)"
         else:
             remedy = "an encoder dropped out, froze or was set anew: leave this time out (rows.window), or repair the record"
         return Check(question, "no", text, limit, remedy)
     return Check(question, "good", "No joint jumps between two samples", limit)
+
+
+def _wrap(steps: Array, high: Array, usual: Array) -> bool:
+    """Whether all jumps of every joint have one size, more than once, as those of a count or an angle that starts anew."""
+    sizes = [s[h] for s, h in zip(steps.T, high.T, strict=True)]
+    again = [len(x) > 1 and np.ptp(x) <= STEP * u for x, u in zip(sizes, usual, strict=True) if len(x)]
+    return bool(again) and all(again)
 
 
 def cut_torques(model: GeneratedModel, records: Sequence[Record], samples: Samples) -> Check | None:
@@ -122,8 +129,8 @@ def change(model: GeneratedModel, samples: Samples) -> Check:
         t = samples.t[own]
         whole = Grams.of(D, Y, moving & own[:, None], samples.tau)
         together = least_squares(whole, 1.0).errors
-        for instant in t[np.linspace(0, len(t) - 1, SPLITS + 2).astype(int)[1:-1]]:
-            parts = [Grams.of(D, Y, moving & (own & side)[:, None], samples.tau) for side in (samples.t < instant, samples.t >= instant)]
+        for split in t[np.linspace(0, len(t) - 1, SPLITS + 2).astype(int)[1:-1]]:
+            parts = [Grams.of(D, Y, moving & (own & side)[:, None], samples.tau) for side in (samples.t < split, samples.t >= split)]
             if min(int(part.rows.sum()) for part in parts) < ROWS * D.shape[2] or min(int(part.rows.min()) for part in parts) < 2 * ROWS:
                 continue
             left = sum(part.squares(least_squares(part, 1.0).X) for part in parts)
@@ -132,7 +139,7 @@ def change(model: GeneratedModel, samples: Samples) -> Check:
             j = int(np.argmax(ratio))
             if ratio[j] > best:
                 best = float(ratio[j])
-                text = f"Before and after {instant:.3g} s, fitted apart, {apart[j]:.1f} % of the torque of joint {model.JOINTS[j]} stay unexplained, "
+                text = f"Before and after {instant(round(float(split), 1))} s, fitted apart, {apart[j]:.1f} % of the torque of joint {model.JOINTS[j]} stay unexplained, "
                 text += f"fitted together {together[j]:.1f} %"
     remedy = "a load, a gain or friction changed there, or two records are joined: use one part (rows.window), or name them as records of their own"
     return Check(question, "doubtful" if best > CHANGE else "good", text, limit, remedy)

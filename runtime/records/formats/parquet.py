@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+from runtime.errors import InputError
 from runtime.records.formats.columns import Array, Groups, Source, Table
 
 READ = 2**18  # rows read at a time: about one row group of the usual writers
@@ -17,6 +18,18 @@ class ParquetTable(Table):
 
     lazy: Any
     rows: int
+    others: Mapping[str, str] = field(default_factory=dict)  # columns of other kinds
+
+    def require(self, names: Sequence[str]) -> None:
+        """Raise InputError unless these columns are there and hold numbers."""
+        for name in names:
+            if name in self.others:
+                raise InputError(
+                    f"it holds {self.others[name]}, no numbers; write them as numbers, a time in seconds, or give record.rate without columns.t",
+                    file=self.file,
+                    column=name,
+                )
+        super().require(names)
 
     def samples(self, groups: Groups) -> int:
         self.require([name for group in groups for name in group])
@@ -38,6 +51,8 @@ def open_parquet(source: Source) -> ParquetTable:
     import polars
 
     lazy = polars.scan_parquet(source.content())
-    names = tuple(name for name, kind in lazy.collect_schema().items() if kind.is_numeric() or kind == polars.Boolean)
+    kinds = lazy.collect_schema()
+    names = tuple(name for name, kind in kinds.items() if kind.is_numeric() or kind == polars.Boolean)
+    others = {name: str(kind) for name, kind in kinds.items() if name not in names}
     rows = int(lazy.select(polars.len()).collect().item())
-    return ParquetTable(file=source.file, size=source.size, names=names, lazy=lazy, rows=rows)
+    return ParquetTable(file=source.file, size=source.size, names=names, lazy=lazy, rows=rows, others=others)

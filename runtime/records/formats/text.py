@@ -24,6 +24,7 @@ LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits 
 HELD = 2**25  # bytes of a file whose numbers are all kept: they are read once
 PIECE = 2**22  # bytes of a longer one, read at a time
 MOST_EMPTY = 5_000_000  # lines without a number
+CLOCK = re.compile(r"\d:\d\d|\d{4}-\d\d-\d\d")  # a time of day, a date
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
 
 
@@ -84,7 +85,10 @@ class TextTable(Table):
         while block := list(islice(lines, size)):
             numbers, texts = zip(*block, strict=True)
             self.require_widths(numbers, texts)
-            plain = [text.replace(self.source.decimal, ".") for text in texts] if self.source.decimal != "." else texts
+            plain: Sequence[str] = texts
+            if self.source.decimal != ".":
+                self._require_no_points(indices, numbers, texts)
+                plain = [text.replace(self.source.decimal, ".") for text in texts]
             try:
                 yield list(np.loadtxt(plain, delimiter=self.delimiter, usecols=indices, ndmin=2, comments=None, quotechar='"').T)
             except ValueError:
@@ -175,6 +179,15 @@ class TextTable(Table):
     def _lines(self) -> Iterator[tuple[int, str]]:
         return islice(_numbered_lines(self.source), 1 if self.has_header else 0, None)
 
+    def require(self, names: Sequence[str]) -> None:
+        """Raise InputError unless these columns are there."""
+        if names and self.has_header and not {*names} & {*self.names}:
+            raise InputError(
+                f"no column {', '.join(names)}; the first line has {', '.join(self.names)}; put # before lines above the names",
+                file=self.file,
+            )
+        super().require(names)
+
     def require_widths(self, numbers: Sequence[int], lines: Sequence[str]) -> None:
         """Raise InputError unless every line has one field per name."""
         widths = [len(line.split()) if self.delimiter is None else line.count(self.delimiter) + 1 for line in lines]
@@ -187,6 +200,20 @@ class TextTable(Table):
                 f"{width} fields; expected {len(self.names)} ({', '.join(self.names)}); {hint}", file=self.file, row=f"line {k}"
             )
 
+    def _require_no_points(self, indices: list[int], numbers: Sequence[int], lines: Sequence[str]) -> None:
+        """Raise InputError where a field has a point beside decimal commas: 1.234 may be a thousand."""
+        for k, line in zip(numbers, lines, strict=True):
+            if "." in line:
+                fields = _fields(line, self.delimiter)
+                for i in (i for i in indices if "." in fields[i]):
+                    hint = "write numbers without separators of thousands, or set record.decimal: '.'"
+                    raise InputError(
+                        f"{fields[i]!r} holds a point, decimals are said to have a comma; {hint}",
+                        file=self.file,
+                        column=self.names[i],
+                        row=f"line {k}",
+                    )
+
     def _not_a_number(self, indices: list[int], numbers: Sequence[int], lines: Sequence[str]) -> InputError | None:
         """What is wrong with the first field that is not a number; None where all of them are empty ones of positions, which may be missing."""
         for k, line in zip(numbers, lines, strict=True):
@@ -198,6 +225,8 @@ class TextTable(Table):
                     hint = "; put # before a second line of names or units" if k == next(self._lines())[0] and fields[i] else ""
                     if position:
                         hint = f", or repair or cut the record; {COUNTS}"
+                    if CLOCK.search(fields[i]):
+                        hint = "; no date or time of day is read: write seconds, or give record.rate without columns.t"
                     if "," in fields[i]:
                         hint = "; write decimals with a point, or set record.decimal: ','"
                     return InputError(f"{what}; expected a number{hint}", file=self.file, column=self.names[i], row=f"line {k}")
