@@ -51,11 +51,19 @@ def late(context, key):
     return key**2
 
 
-def always_dying(own, key):
+def dying_elsewhere(own, key=0, mark=None):
     if os.getpid() != own:
+        if mark:
+            mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    time.sleep(0.5)
+    while mark and not mark.exists():
+        time.sleep(0.01)
     return key
+
+
+def always_dying(context, key):
+    """Every other process dies; this one waits until one has begun."""
+    return dying_elsewhere(context[0], key, context[1])
 
 
 def test_a_dead_process_loses_nothing(tmp_path):
@@ -66,9 +74,9 @@ def test_a_dead_process_loses_nothing(tmp_path):
 
 
 @pytest.mark.campaign
-def test_processes_that_always_die():
+def test_processes_that_always_die(tmp_path):
     with pytest.raises(InputError, match="processes died 3 times before any of"):
-        list(results(always_dying, os.getpid(), range(4), 2))
+        list(results(always_dying, (os.getpid(), tmp_path / "mark"), range(4), 2))
 
 
 @campaign
@@ -141,7 +149,7 @@ def test_a_value_is_computed_meanwhile_by_another_process():
         assert workers.meanwhile(os.getpid)() == os.getpid()
         workers.start()
         assert workers.meanwhile(os.getpid)() != os.getpid()
-        assert workers.meanwhile(partial(always_dying, os.getpid(), 7))() == 7
+        assert workers.meanwhile(partial(dying_elsewhere, os.getpid(), 7))() == 7
         assert sorted(results(pow, 2, range(4), workers)) == [1, 2, 4, 8]
 
 
