@@ -208,8 +208,8 @@ def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, n
             "FL": s * transmitted[:, j],
         }
 
-        def excess(VS: float, v: Array = v, j: int = j) -> Array:
-            return at_rows(np.sign(v) * np.exp(-((v / VS) ** 2)), j)
+        def excess(VS: float | Array, v: Array = v, j: int = j) -> Array:
+            return at_rows(np.sign(v) * np.exp(-((v / np.asarray(VS)[..., None]) ** 2)), j)
 
         linear = {name: at_rows(signal, j) for name, signal in signals.items()}
         own_block = block[rows] + (number << 32)

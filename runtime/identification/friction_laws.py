@@ -36,21 +36,21 @@ class Terms:
         Block of time of each row.
     linear : mapping of str to ndarray, shape (N,)
         Terms of the laws by the name of their parameter.
-    excess : function of float to ndarray, shape (N,)
-        The term of FST for a given VS.
+    excess : function of float to ndarray, shape (N,), or of ndarray, shape (k,), to (k, N)
+        The term of FST for a given VS, or for several.
     """
 
     f: Array
     v: Array
     block: Array
     linear: Mapping[str, Array]
-    excess: Callable[[float], Array]
+    excess: Callable[[float | Array], Array]
 
     @cached_property
     def grid(self) -> tuple[Array, Array]:
         """Logarithms of the VS among which a search begins, shape (k,), and the term of FST for each, shape (k, N)."""
         x = np.log(np.abs(self.v).max() * np.geomspace(SLOWEST, FASTEST, GRID))
-        return x, np.array([self.excess(float(np.exp(one))) for one in x])
+        return x, self.excess(np.exp(x))
 
 
 LAWS: Mapping[str, tuple[str, ...]] = {
@@ -67,7 +67,7 @@ def joined(parts: Sequence[Terms]) -> Terms:
     linear = {name: np.concatenate([part.linear[name] for part in parts]) for name in parts[0].linear}
     _, block = np.unique(np.concatenate([part.block for part in parts]), return_inverse=True)
     f, v = (np.concatenate([getattr(part, name) for part in parts]) for name in ("f", "v"))
-    return Terms(f, v, block, linear, lambda VS: np.concatenate([part.excess(VS) for part in parts]))
+    return Terms(f, v, block, linear, lambda VS: np.concatenate([part.excess(VS) for part in parts], axis=-1))
 
 
 def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:

@@ -175,9 +175,9 @@ def decimate(u: Array, plan: Plan) -> Array:
 def recursion(a: Array, x: Array, drive: Array) -> None:
     """x_(b+1) = a x_b + drive_b: x, shape (B + 1, S, 2 m), x_0 given; drive, shape (B, S, 2 m)."""
     z = x.view(complex)
-    for b, d in enumerate(drive.view(complex)):
-        np.multiply(a, z[b], out=z[b + 1])
-        z[b + 1] += d
+    for before, after, d in zip(z, z[1:], drive.view(complex), strict=False):
+        np.multiply(a, before, out=after)
+        np.add(after, d, out=after)
 
 
 def copy_overlap(u: Array, t0: int, window: Array, start: int) -> None:

@@ -182,15 +182,13 @@ def _drawn(values: np.ndarray) -> np.ndarray:
 def panels_figure(
     rows: int, columns: int, size: tuple[float, float], *, used: int | None = None, right: float = 0.12, below: float = 0.0
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of `size`, inch, and its panels row by row; those beyond `used` are blank.
+    """A figure of `size`, inch, and its panels row by row; there are none beyond `used`.
 
     right, below : room for what stands to the right of a panel, and below it besides a line of ticks and a label, inch.
     """
     figure = empty_figure(size, layout=PanelLayout(right=right, below=below))
-    axes = list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
-    for ax in axes[used:] if used is not None else ():
-        ax.set_visible(False)
-    return figure, axes
+    grid = figure.add_gridspec(rows, columns)
+    return figure, [figure.add_subplot(grid[k]) for k in range(rows * columns if used is None else used)]
 
 
 def shared_legend(figure: Figure, panels: Sequence[Axes], columns: int, *, size: float = STYLE["font.size"]) -> None:

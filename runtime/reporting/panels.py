@@ -35,7 +35,7 @@ class PanelLayout(LayoutEngine):
 
     def execute(self, fig: Figure) -> None:
         """Place the panels; twice, as the places decide how many ticks there are."""
-        panels = [(ax, place) for ax in fig.axes if ax.get_visible() and (place := ax.get_subplotspec()) is not None]
+        panels = [(ax, place) for ax in fig.axes if (place := ax.get_subplotspec()) is not None]
         for axis in (axis for ax, _ in panels for axis in (ax.xaxis, ax.yaxis) if not axis.get_label_text()):
             axis.set_label_coords(0.0, 0.0)  # else matplotlib seeks a place for the empty label, among all ticks
         for _ in range(2):

@@ -33,7 +33,7 @@ def advice_figure(advice: Advice) -> Figure:
             for curve in curves:
                 _panel(ax, *curve, advice.names.index(name))
             ax.set_title(name, fontsize=9)
-        for k, ax in enumerate(axes[: len(names)]):
+        for k, ax in enumerate(axes):
             ax.tick_params(labelleft=k % columns == 0, labelbottom=k + columns >= len(names), labelsize=7)
         shared_legend(figure, axes[:1], 4, size=8)
         figure.supxlabel(f"resolution Δ of every encoder, {advice.unit}", fontsize=9)
