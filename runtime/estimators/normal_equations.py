@@ -21,8 +21,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve, cholesky
-from scipy.linalg.lapack import dpocon
+from scipy.linalg.lapack import dpocon, dpotrf, dpotrs
 
 from runtime.estimators.solution import solve
 from runtime.observation.qr_factor import Array, Factor, JointFactor
@@ -66,7 +65,7 @@ class JointEquations:
         """W'W, shape (b, b)."""
         A = np.zeros((self.b, self.b))
         for C, gram in zip(self.columns, self.grams, strict=True):
-            A[np.ix_(C, C)] += gram[:-1, :-1]
+            A[C[:, None], C] += gram[:-1, :-1]
         return A
 
     @property
@@ -89,9 +88,8 @@ class JointEquations:
             return None
         D = 1 / np.sqrt(diagonal)
         scaled = A * D * D[:, None]
-        try:
-            L = cholesky(scaled, lower=True)
-        except LinAlgError:
+        L, failed = dpotrf(scaled, lower=1)
+        if failed:
             return None
         rcond, _ = dpocon(L, np.abs(scaled).sum(axis=0).max(), uplo="L")
         return Cholesky(L, D, float(1 / np.sqrt(rcond)) if rcond > 0 else np.inf)
@@ -107,7 +105,7 @@ class Cholesky:
 
     def solve(self, g: Array) -> Array:
         """A^-1 g."""
-        return np.asarray(self.D * cho_solve((self.L, True), self.D * g))
+        return np.asarray(self.D * dpotrs(self.L, self.D * g, lower=1)[0])
 
 
 def normal(blocks: Iterable[Block], columns: Sequence[Array], b: int) -> JointEquations:
