@@ -16,8 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pooch
-
 from runtime.errors import DataUnavailableError, InputError
 from runtime.files import is_file, read_bytes, sha256
 
@@ -136,6 +134,8 @@ def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
     path, tried = _local(name, file, cache)
     if path is not None:
         return path
+    import pooch  # 25 ms, where the file is not in SYMGEN_DATA
+
     dataset = _dataset(name)
     folder = _cache(cache) / name
     source = pooch.create(
@@ -190,7 +190,11 @@ def _digest(name: str, file: str) -> str:
 
 
 def _cache(cache: Path | None) -> Path:
-    return Path(pooch.os_cache("symgen")) if cache is None else cache
+    if cache is not None:
+        return cache
+    import pooch
+
+    return Path(pooch.os_cache("symgen"))
 
 
 def _short(e: Exception) -> str:

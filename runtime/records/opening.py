@@ -12,6 +12,7 @@ import numpy as np
 from runtime.errors import InputError, ModelError
 from runtime.model.drives import Drives
 from runtime.records.clock import Stamps
+from runtime.records.datasets import fetch
 from runtime.records.formats.columns import Array, Table
 from runtime.records.formats.table import open_table
 from runtime.records.joint_side import Conversion, column_names, conversion, require_alike, require_finite
@@ -240,8 +241,6 @@ def record_files(settings: RecordSettings, folder: Path) -> list[Path]:
         raise InputError("the record names no file; set record.files")
     if settings.dataset is None:
         return [folder / file for file in settings.files]
-    from runtime.records.datasets import fetch  # pooch, only where a dataset is asked for
-
     return [fetch(settings.dataset, file) for file in settings.files]
 
 

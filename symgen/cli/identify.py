@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from runtime.parallel import Workers
 from runtime.result_files import reserved
 from symgen.cli.session import (
     NEGATIVE,
@@ -54,6 +53,8 @@ def identify(
     json: Annotated[bool, typer.Option("--json", help="Print estimate.json instead of tables.")] = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code 1 where the estimator does not end well."""
+    from runtime.parallel import Workers
+
     single_thread()
     with reported_errors(), progress_lines(), reserved(output) as results, Workers(workers) as processes:
         import runtime

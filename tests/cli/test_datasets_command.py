@@ -14,7 +14,7 @@ def run(*arguments):
 
 def test_nothing_here(tmp_path, monkeypatch):
     monkeypatch.setenv("SYMGEN_DATA", str(tmp_path))
-    monkeypatch.setattr("runtime.records.datasets.pooch.os_cache", lambda name: tmp_path / "cache")
+    monkeypatch.setattr("pooch.os_cache", lambda name: tmp_path / "cache")
     result = run()
     assert result.exit_code == 0
     assert all(sha in result.stdout for dataset in DATASETS.values() for sha in dataset.files.values())

@@ -29,8 +29,8 @@ def offline(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("SYMGEN_DATA", raising=False)
-        patch.setattr("runtime.records.datasets.pooch.os_cache", lambda name: folder / "cache")
-        patch.setattr("runtime.records.datasets.pooch.HTTPDownloader", lambda timeout: _refused)
+        patch.setattr("pooch.os_cache", lambda name: folder / "cache")
+        patch.setattr("pooch.HTTPDownloader", lambda timeout: _refused)
         result = run("-o", folder / "out", "--quick")
     return result, folder / "out"
 

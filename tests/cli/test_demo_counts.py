@@ -38,8 +38,8 @@ def test_measured(tx40_data, tmp_path):
 def test_offline(tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("SYMGEN_DATA", raising=False)
-        patch.setattr("runtime.records.datasets.pooch.os_cache", lambda name: tmp_path / "cache")
-        patch.setattr("runtime.records.datasets.pooch.HTTPDownloader", lambda timeout: _refused)
+        patch.setattr("pooch.os_cache", lambda name: tmp_path / "cache")
+        patch.setattr("pooch.HTTPDownloader", lambda timeout: _refused)
         result = run("-o", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert "SIMULATED" in result.stdout and "No measured record" in result.stderr
