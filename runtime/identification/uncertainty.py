@@ -253,8 +253,10 @@ def block_bootstrap(
 
 
 def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
-    """Tests along the trail; share : rows that count over rows."""
+    """Tests along the trail, none where there are no more rows than parameters; share : rows that count over rows."""
     r, b = essential.all_parameters.rows, len(essential.all_parameters.names)
+    if r <= b:
+        return ()
     tests = []
     before = 1.0  # S over S_0
     for q, step in enumerate(essential.trail, start=1):

@@ -1,4 +1,5 @@
-"""What is valid in a robot but probably not meant: angles a hair off a round one, equal sides of a loop under two names."""
+"""What is valid in a robot but probably not meant: angles a hair off a round one, equal sides of a loop under two names, numbers in degrees, mm or
+cm/s^2."""
 
 from __future__ import annotations
 
@@ -8,14 +9,20 @@ from itertools import combinations
 
 from symgen.derive.loops import close
 from symgen.description.expression import PI, twelfths
-from symgen.description.robot import Robot
+from symgen.description.robot import REVOLUTE, Robot
 
 CLOSE = 1e-3  # rad: nearer to a round angle than a drawing shows, and not on it
+
+GRAVITY = 0.5, 30.0  # m/s^2, of small moons and large planets
+LONGEST = 100.0  # m
+LOPSIDED = 50.0  # a length over the sum of the others
+DEGREES = 30.0  # rad: a zero or a limit beyond is one in degrees ...
+UNLIMITED = 1000.0  # ... unless it stands for none at all
 
 
 def doubts(robot: Robot) -> list[str]:
     """A sentence for each. Raises DescriptionError where a loop does not close."""
-    return [*nearly_round(robot), *equal_sides(robot)]
+    return [*nearly_round(robot), *other_units(robot), *equal_sides(robot)]
 
 
 def nearly_round(robot: Robot) -> list[str]:
@@ -31,6 +38,29 @@ def nearly_round(robot: Robot) -> list[str]:
                 notes.append(
                     f"frame {f.j}: {name} has {angle}, not {meant}: "
                     f"another robot, with other formulas; write {meant} (of a URDF: symgen convert --snap 1e-4)"
+                )
+    return notes
+
+
+def other_units(robot: Robot) -> list[str]:
+    """Sizes that no robot has in SI and rad: gravity, lengths, zeros of the drives, limits."""
+    notes = []
+    g = math.hypot(*(e.value(robot.constants) for e in robot.gravity))
+    if g and not GRAVITY[0] <= g <= GRAVITY[1]:
+        notes.append(f"gravity is {g:g} m/s^2; that of the Earth is 9.81, in m/s^2")
+    lengths = {(f.j, name): abs(getattr(f, name).value(robot.constants)) for f in robot.frames for name in ("b", "d", "r0")}
+    total = sum(lengths.values())
+    for (j, name), length in lengths.items():
+        if length > LONGEST or (length > 1 and length > LOPSIDED * (total - length) > 0):
+            notes.append(f"frame {j}: {name.removesuffix('0')} holds a length of {length:g} m; lengths are in m, not mm")
+    turning = [k for k, j in enumerate(robot.joints) if robot.frame(j).sigma == REVOLUTE]
+    zeros = robot.drives.offset if robot.drives else ()
+    bounds = [max(map(abs, x)) if isinstance(x, tuple) else abs(x) for x in robot.limits.get("q", ())]
+    for what, values in (("drives.offset", zeros), ("limits.q", bounds)):
+        for k in turning:
+            if k < len(values) and DEGREES < abs(values[k]) < UNLIMITED:
+                notes.append(
+                    f"{what} of joint {robot.joints[k]}: {values[k]:g} rad are {abs(values[k]) / (2 * math.pi):.3g} turns; angles are in rad, not degrees"
                 )
     return notes
 

@@ -4,7 +4,7 @@ import pytest
 from typer.testing import CliRunner
 
 from symgen.cli.main import app
-from symgen.derive.doubts import equal_sides, nearly_round
+from symgen.derive.doubts import doubts, equal_sides, other_units
 from symgen.description import load_robot, packaged_robots, parse_robot
 
 TWO_BARS = """\
@@ -38,8 +38,35 @@ def test_a_parallelogram_and_unequal_sides_are_not():
 
 @pytest.mark.parametrize("name", packaged_robots())
 def test_packaged_robots_raise_no_doubt(name):
-    described = load_robot(name)
-    assert nearly_round(described) == [] and equal_sides(described) == []
+    assert doubts(load_robot(name)) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("g: 9.81", "g: 981", "gravity is 981 m/s^2"),
+        ("L1: 0.4", "L1: 400", "frame 2: d holds a length of 400 m; lengths are in m, not mm"),
+        ("gravity:", "drives: {ratio: [[100]], offset: [-90]}\ngravity:", "drives.offset of joint 1: -90 rad are 14.3 turns"),
+        ("gravity:", "limits: {q: [[-170, 180]]}\ngravity:", "limits.q of joint 1: 180 rad are 28.6 turns"),
+    ],
+)
+def test_other_units_are_told(old, new, words):
+    (note,) = other_units(
+        robot(
+            TWO_BARS.replace(old, new)
+            .split("  3:")[0]
+            .replace(" mu: 0,", "")
+            .replace("[[100]], offset: [-90]", "[[100, 0], [0, 100]], offset: [-90, 0]")
+            .replace("[[-170, 180]]", "[[-170, 180], 3]")
+        )
+    )
+    assert words in note
+
+
+def test_large_and_small_robots_and_free_joints_are_left_alone():
+    crane = TWO_BARS.split("  3:", maxsplit=1)[0].replace(" mu: 0,", "").replace("L1: 0.4", "L1: 80").replace("d: 0,", "d: 12,")
+    assert other_units(robot(crane + "limits: {q: [1e16, 25]}\n")) == []
+    assert other_units(robot(crane.replace("80", "0.002").replace("d: 12,", "d: 0,").replace("g: 9.81", "g: 1.62"))) == []
 
 
 @pytest.mark.parametrize(("angle", "meant"), [("1.5708", "pi/2"), ("-1.5707963", "-pi/2"), ("0.7854", "pi/4"), ("0.0001", "0")])
