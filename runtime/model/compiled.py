@@ -288,8 +288,10 @@ class CompiledText(ModelText):
         return model
 
 
-def text_of(model: GeneratedModel) -> ModelText:
+def text_of(model: GeneratedModel | ModelText) -> ModelText:
     """The model as text, for another process: module and, of a compiled model, C file."""
+    if isinstance(model, ModelText):
+        return model
     module = ModelText.of(model)
     return CompiledText(module.name, module.text, module.digest, model.source) if isinstance(model, CompiledSignals) else module
 

@@ -132,6 +132,11 @@ class ModelText:
             yield path
 
 
+def loaded(model: GeneratedModel | ModelText) -> GeneratedModel:
+    """The model of a text that another process sent; a model as it is."""
+    return model.load() if isinstance(model, ModelText) else model
+
+
 def checked_model(module: ModuleType) -> GeneratedModel:
     """The module itself if it is an emitted model with n, b and shapes that agree; ModelError otherwise."""
     label = module.__name__

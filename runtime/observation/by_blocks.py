@@ -18,7 +18,7 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.model.compiled import text_of
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, ModelText
+from runtime.model.generated import GeneratedModel, ModelText, loaded
 from runtime.observation.counts import stretches
 from runtime.observation.counts_by_blocks import CountStage, CountStart
 from runtime.observation.filters import SpeedErrors, States, decimation_factor, decimation_plan, kept_samples
@@ -80,7 +80,7 @@ class BlockTask:
     @cached_property
     def loaded(self) -> GeneratedModel:
         """The model."""
-        return self.model.load() if isinstance(self.model, ModelText) else self.model
+        return loaded(self.model)
 
     @cached_property
     def entries(self) -> Entries:
@@ -89,7 +89,7 @@ class BlockTask:
 
     def __getstate__(self) -> dict[str, Any]:
         """For other processes: the model as text, nothing of what was computed from it."""
-        return {**{f.name: getattr(self, f.name) for f in fields(self)}, "model": text_of(self.loaded)}
+        return {**{f.name: getattr(self, f.name) for f in fields(self)}, "model": text_of(self.model)}
 
     @property
     def columns(self) -> list[Array]:

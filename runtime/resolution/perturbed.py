@@ -21,7 +21,7 @@ from runtime.estimators.essential import essential_of
 from runtime.estimators.methods import linear_companion, observed, point_estimate
 from runtime.model.compiled import text_of
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, ModelText, base_columns
+from runtime.model.generated import GeneratedModel, ModelText, base_columns, loaded
 from runtime.observation.filters import States, filtered_states
 from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, stack
 from runtime.observation.rows import Selection, select_rows
@@ -111,12 +111,11 @@ class Task:
     def __getstate__(self) -> dict[str, Any]:
         """For other processes: model and loop as text."""
         loop = LoopText.of(self.loop) if isinstance(self.loop, Loop) else self.loop
-        model = self.model if isinstance(self.model, ModelText) else text_of(self.model)
-        return {**vars(self), "model": model, "loop": loop}
+        return {**vars(self), "model": text_of(self.model), "loop": loop}
 
     def opened(self) -> tuple[Task, GeneratedModel]:
         """The task and the model as they run in this process."""
-        model = self.model.load() if isinstance(self.model, ModelText) else self.model
+        model = loaded(self.model)
         return (replace(self, loop=self.loop.load(model)) if isinstance(self.loop, LoopText) else self), model
 
 

@@ -27,7 +27,7 @@ from runtime.identification.plausibility.samples import STANDING, Samples, excer
 from runtime.identification.plausibility.through_time import change, cut_torques, jumps
 from runtime.identification.plausibility.trials import ALIKE, DECISIVE, Problem, Trial, decisive, problem_of, tried
 from runtime.model.compiled import text_of
-from runtime.model.generated import GeneratedModel, ModelText, joint_units
+from runtime.model.generated import GeneratedModel, ModelText, joint_units, loaded
 from runtime.model.inertia import physical_model
 from runtime.observation.observation import observe
 from runtime.observation.states import unwrapped
@@ -208,16 +208,12 @@ class PlausibilityTask:
 
     def __call__(self) -> Plausibility:
         """What is found."""
-        model, variants = (x.load() if isinstance(x, ModelText) else x for x in (self.model, self.variants))
-        assert model is not None
-        return plausibility(model, self.records, self.study, variants=variants)
+        variants = None if self.variants is None else loaded(self.variants)
+        return plausibility(loaded(self.model), self.records, self.study, variants=variants)
 
     def __getstate__(self) -> dict[str, Any]:
-        texts = {
-            key: x if x is None or isinstance(x, ModelText) else text_of(x)
-            for key, x in (("model", self.model), ("variants", self.variants))
-        }
-        return {**vars(self), **texts}
+        variants = None if self.variants is None else text_of(self.variants)
+        return {**vars(self), "model": text_of(self.model), "variants": variants}
 
 
 def _ranked(trials: Sequence[Trial]) -> list[Trial]:
