@@ -201,15 +201,16 @@ RANDOM = [seed for seed in range(900_000, 900_030) if random_robot(seed).element
 def test_parameters_that_the_motion_cannot_tell_are_named_before_the_fit() -> None:
     """One joint moves a thousandth of what it did: what is named has a deviation far above that of the others in the fit too."""
     _, model, right = random_record(RANDOM[0])
-    assert excited(model, [right], Study()).state == "good"
+    signals, rate = Study().signals, right.rate
+    assert excited(runtime.observe(model, right), signals, rate).state == "good"
     q = right.q.copy()
     q[:, 0] = q[0, 0] + 1e-3 * (q[:, 0] - q[0, 0])
     record = runtime.Record(right.t, q, right.tau)
-    shares = unexcited_shares(model, [record], Study())
-    check = excited(model, [record], Study())
+    observation = runtime.observe(model, record)
+    shares, check = unexcited_shares(observation, signals, rate), excited(observation, signals, rate)
     assert check.state == "doubtful" and max(shares, key=shares.__getitem__) in check.finding
     unseen = {name for name, share in shares.items() if share > UNSEEN}
-    fit = estimate_of(runtime.observe(model, record), model=model)
+    fit = estimate_of(observation, model=model)
     deviation = dict(zip(fit.names, 100 * fit.sigma / np.abs(fit.X), strict=True))
     assert np.median([deviation[name] for name in unseen]) > 3 * np.median([deviation[name] for name in shares.keys() - unseen])
 

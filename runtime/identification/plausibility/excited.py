@@ -8,17 +8,13 @@ its %sigma is hardly below share_i. The torque noise is taken as NOISE of the to
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from runtime.errors import InputError
 from runtime.excitation.criteria import Weights, kept_correlation
 from runtime.identification.checklist import DEVIATION, NAMED, Check
-from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import observe
-from runtime.records.record import Record
-from runtime.settings.study import Study
+from runtime.observation.observation import Observation
+from runtime.settings.study import Signals
 
 NOISE = 0.05
 """Deviation of the torque noise, of the rms of the torque of a joint."""
@@ -28,10 +24,10 @@ UNSEEN = 100.0
 """Share, %, above which nothing is told of a parameter, however large it is."""
 
 
-def excited(model: GeneratedModel, records: Sequence[Record], study: Study) -> Check | None:
-    """Parameters that the motion cannot tell; None where no row is used, or W has no full rank, which the fit itself says by name."""
+def excited(observation: Observation, signals: Signals, rate: float) -> Check | None:
+    """Parameters that the motion cannot tell; None where W has no full rank, which the fit itself says by name."""
     try:
-        shares = unexcited_shares(model, records, study)
+        shares = unexcited_shares(observation, signals, rate)
     except (InputError, np.linalg.LinAlgError):
         return None
     question, limit = (
@@ -51,9 +47,8 @@ def excited(model: GeneratedModel, records: Sequence[Record], study: Study) -> C
     return Check(question, "doubtful", f"It cannot tell {named}, whatever their values", limit, remedy)
 
 
-def unexcited_shares(model: GeneratedModel, records: Sequence[Record], study: Study) -> dict[str, float]:
+def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:
     """share_i, %, by name of the parameter; LinAlgError where W has no full rank."""
-    observation = observe(model, records, study)
     s = np.array([NOISE * float(np.sqrt(np.mean(observation.Y[observation.joint(j)] ** 2))) for j in range(observation.n)])
     if not s.all():
         raise InputError("torques that are zero throughout")
@@ -63,5 +58,5 @@ def unexcited_shares(model: GeneratedModel, records: Sequence[Record], study: St
     weights = Weights(observation.names, s, float(np.linalg.norm(observation.Y / s[observation.joints])) / columns)
     if weights.condition(observation) > SINGULAR:
         raise np.linalg.LinAlgError("no full rank")
-    sigma = weights.relative_sigma(observation, kept_correlation(study.signals, records[0].rate))
+    sigma = weights.relative_sigma(observation, kept_correlation(signals, rate))
     return dict(zip(observation.names, map(float, sigma), strict=True))

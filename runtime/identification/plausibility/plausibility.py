@@ -29,7 +29,7 @@ from runtime.identification.plausibility.trials import ALIKE, DECISIVE, Problem,
 from runtime.model.compiled import text_of
 from runtime.model.generated import GeneratedModel, ModelText, joint_units, loaded
 from runtime.model.inertia import physical_model
-from runtime.observation.observation import observe
+from runtime.observation.observation import Observation, observe
 from runtime.observation.states import unwrapped
 from runtime.progress import at
 from runtime.records.record import Record
@@ -158,8 +158,12 @@ def plausibility(
         physical = physical_model(model)
     except InputError:
         physical = None
-    motion = excited(model, whole, study)
-    checks += [jumps(model, whole, study), *before_checks(model, samples, physical), rest(model, whole, study, samples)]
+    try:
+        observation: Observation | None = observe(model, whole, study)
+    except (InputError, np.linalg.LinAlgError):  # no row is used, counts that cannot be read
+        observation = None
+    motion = None if observation is None else excited(observation, study.signals, whole[0].rate)
+    checks += [jumps(model, whole, study), *before_checks(model, samples, physical), rest(model, whole, study, samples, observation)]
     checks += [] if motion is None else [motion]
     rows = samples.moving().sum(axis=0)
     enough = int(rows.sum()) > ROWS * len(model.BASE_PARAMETERS) and int(rows.min()) > FEWEST
@@ -228,8 +232,10 @@ def _ranked(trials: Sequence[Trial]) -> list[Trial]:
     return sorted(kept, key=lambda trial: -trial.gain)
 
 
-def rest(model: GeneratedModel, records: Sequence[Record], study: Study, samples: Samples) -> Check:
-    """Share of the instants at which a joint stands, and what leaving them out changes."""
+def rest(model: GeneratedModel, records: Sequence[Record], study: Study, samples: Samples, observation: Observation | None) -> Check:
+    """Share of the instants at which a joint stands, and what leaving them out changes. observation : of the study; None: without rows."""
+    from runtime.estimators.methods import estimate_of
+
     question = "Do the joints move while they are used?"
     limit = f"standing at most {100 * REST:g} % of the rows that are used"
     share = standing_share(samples, study)
@@ -240,14 +246,15 @@ def rest(model: GeneratedModel, records: Sequence[Record], study: Study, samples
         return Check(question, "good", text, limit)
     stated = list(proposed) if isinstance(proposed, tuple) else proposed
     remedy = f"set rows.low_speed: {stated} ({joint_units(model)[worst]}/s), or cut the record (rows.window)"
-    errors = []
-    for rows in (study.rows, replace(study.rows, low_speed=proposed)):
-        try:
-            errors.append(_error(model, records, replace(study, rows=rows)))
-        except InputError:
-            return Check(question, "doubtful", text, limit, remedy)
-    text += f"; without these rows the fit leaves {errors[1]:.1f} % in place of {errors[0]:.1f} %"
-    state: State = "no" if errors[1] < 0.5 * errors[0] else "doubtful" if errors[1] < 0.8 * errors[0] else "good"
+    try:
+        without = observe(model, records, replace(study, rows=replace(study.rows, low_speed=proposed)))
+    except InputError:
+        without = None
+    if observation is None or without is None:
+        return Check(question, "doubtful", text, limit, remedy)
+    before, after = (estimate_of(one, EstimateSettings(), model=model).relative_error for one in (observation, without))
+    text += f"; without these rows the fit leaves {after:.1f} % in place of {before:.1f} %"
+    state: State = "no" if after < 0.5 * before else "doubtful" if after < 0.8 * before else "good"
     return Check(question, state, text, limit, remedy)
 
 
@@ -266,13 +273,6 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
     low = np.broadcast_to(np.asarray(study.rows.low_speed, dtype=float), (samples.n,))
     wanted = tuple(float(f"{max(v, x):.1g}") for v, x in zip(np.where(still(samples), 0.0, samples.standing()), low, strict=True))
     return max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
-
-
-def _error(model: GeneratedModel, records: Sequence[Record], study: Study) -> float:
-    """Relative error of ordinary least squares, %."""
-    from runtime.estimators.methods import estimate_of
-
-    return estimate_of(observe(model, records, study), EstimateSettings(), model=model).relative_error
 
 
 def closure(message: str) -> Check:
