@@ -30,6 +30,7 @@ from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel
 from runtime.observation.encoder_advice import encoder_sentences
 from runtime.observation.observation import Observation
+from runtime.observation.rows import unused_joints
 from runtime.records.provenance import record_names
 from runtime.records.record import UNNAMED, Record
 from runtime.records.stream import Stream
@@ -240,14 +241,15 @@ class Identification:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to look at before the values are used, in sentences: signs that no drive has, torques that may be currents, lost joints, parameters that trade."""
+        """What to look at before the values are used, in sentences: joints without rows, signs that no drive has, torques that may be currents, lost joints, parameters that trade."""
         signs = (
             f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: a sign of the joint is wrong (ratio, torque constant or "
             "column), or its coupling, unit or frame."
         )
         lost = lost_joints(self.estimate, self.model_estimate)
         unit = torque_unit_doubt(self.model, self.observation)
-        sentences = (signs if self.negative else "", f"{unit}." if unit else "", f"{lost}." if lost else "")
+        unused = unused_joints(self.observation.rows, self.observation.dropped, self.model.JOINTS)
+        sentences = (unused, signs if self.negative else "", f"{unit}." if unit else "", f"{lost}." if lost else "")
         return (*(sentence for sentence in sentences if sentence), *self.correlations.warnings)
 
     def __str__(self) -> str:

@@ -78,6 +78,25 @@ def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
     return f"none of its {K} rows per joint is used: {left_out}; choose these settings anew, or leave this record out"
 
 
+def unused_joints(rows: Sequence[int], dropped: Mapping[str, Sequence[int]], joints: Sequence[int]) -> str:
+    """The joints of which no row is used, and what leaves most of them out, a sentence; "" where every joint has rows.
+
+    Parameters
+    ----------
+    rows : sequence of int
+        Rows used, by joint.
+    dropped : mapping of str to sequence of int
+        Rows left out, by reason and joint.
+    joints : sequence of int
+        Their numbers.
+    """
+    bare = [j for j, count in enumerate(rows) if not count]
+    if not bare or not dropped:
+        return ""
+    reason = max(dropped, key=lambda name: sum(dropped[name][j] for j in bare))
+    return f"No row of joint {', '.join(str(joints[j]) for j in bare)} is used: {LEAVES_OUT.get(reason, reason)} leaves them out."
+
+
 def _window(record: Record, rows: Rows) -> slice:
     """Raw samples with t0 <= t <= t1."""
     t0, t1 = rows.window

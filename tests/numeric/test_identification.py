@@ -187,6 +187,15 @@ def test_records_that_do_not_belong_together_are_told_in_a_sentence(model):
     assert "another robot, load or wiring" in result.checklist.next
 
 
+def test_joints_of_which_no_row_is_left_are_told(model):
+    """low_speed in degrees a second: too few rows for any test, and one sentence says why."""
+    record = measured(model, 1)
+    fastest = np.abs(np.gradient(record.q[:, 1], 1 / record.rate)).max()
+    result = runtime.identify(model, record, replace(STUDY, rows=replace(STUDY.rows, low_speed=(1e3, 0.97 * fastest))))
+    assert result.warnings[0] == "No row of joint 1 is used: rows.low_speed leaves them out."
+    assert result.estimate.status == "rank-deficient"
+
+
 def test_the_status_of_every_method_decides(model):
     """Not converged is no value, whatever the rest says."""
     result = runtime.identify(model, measured(model, 1), STUDY)
