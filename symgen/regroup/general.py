@@ -1,7 +1,7 @@
 """Base parameters of robots with general loops, exact: relations from points of the closed mechanism over F_p (`regroup.closed_draw`).
 
 Which columns depend on which shows at points of one geometry, by an echelon form. Coefficients are first looked for among multiples of monomials of
-lengths and sums of two, at two geometries. Others, beta_k = P_k/Q with polynomials in the lengths, are the nullspace over F_p of
+lengths and sums of two or three, at two geometries. Others, beta_k = P_k/Q with polynomials in the lengths, are the nullspace over F_p of
 
     Q D_dependent - sum_k P_k D_k = 0      at more points of V than there are unknowns,
 
@@ -35,6 +35,7 @@ SPREAD, MOST_STATES = 0.4, 4000  # rad about the start, and of half the longest 
 DEGREES = range(4)  # of Q; units then fix the degree of every P
 MAX_UNKNOWNS = 1200
 LARGEST_FACTOR, LARGEST_BELOW, MOST_MONOMIALS = 12, 2, 20_000  # of a monomial, lengths in its denominator, and monomials looked at
+MOST_OF_THREE = 60  # monomials of which sums of three are looked for
 
 
 class FloatStates:
@@ -177,7 +178,7 @@ class Monomial:
 
 
 class Monomials:
-    """Coefficients that are a multiple of a monomial of lengths, or a sum or difference of two, by their residues at two geometries."""
+    """Coefficients that are a multiple of a monomial of lengths, a sum or difference of two, or of three without lengths below, by their residues at two geometries."""
 
     def __init__(self, draws: Sequence[ClosedDraw]) -> None:
         self.p = draws[0].p
@@ -198,10 +199,21 @@ class Monomials:
                 if c == other and (factor := small_rational(c, self.p, LARGEST_FACTOR)) is not None:
                     return m.expression * factor
             place = {m.residues[0]: m for m in known}
-            for m, sign, other in product(known, (1, -1), (1, -1)):
-                n = place.get(other * (residues[0] - sign * m.residues[0]) % self.p)
-                if n is not None and (sign * m.residues[1] + other * n.residues[1] - residues[1]) % self.p == 0:
-                    return m.expression * sign + n.expression * other
+            if (two := self._two(residues, known, place)) is not None:
+                return two
+            if not below and len(known) <= MOST_OF_THREE:
+                for m, sign in product(known, (1, -1)):
+                    rest = [x - sign * y for x, y in zip(residues, m.residues, strict=True)]
+                    if (two := self._two(rest, known, place)) is not None:
+                        return m.expression * sign + two
+        return None
+
+    def _two(self, residues: Sequence[int], known: Sequence[Monomial], place: Mapping[int, Monomial]) -> Expression | None:
+        """A sum or difference of two of the known monomials; `place` finds them by their first residue."""
+        for m, sign, other in product(known, (1, -1), (1, -1)):
+            n = place.get(other * (residues[0] - sign * m.residues[0]) % self.p)
+            if n is not None and (sign * m.residues[1] + other * n.residues[1] - residues[1]) % self.p == 0:
+                return m.expression * sign + n.expression * other
         return None
 
     def _table(self, degree: int, below: int) -> list[Monomial]:

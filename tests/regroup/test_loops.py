@@ -20,6 +20,7 @@ from symgen.description.expression import ONE
 from symgen.description.grammar import parse
 from symgen.description.robot import FIXED, Element, Frame
 from symgen.errors import DescriptionError
+from symgen.regroup import general
 from symgen.regroup.certificate import certify_formulas
 from symgen.regroup.regrouping import BaseParameter, Regrouping, regroup
 
@@ -207,6 +208,40 @@ def test_five_bar() -> None:
         "ZZ4R": "-L4",
     }
     assert {b.name: str(b.combination["MX4"]) for b in found.base if "MX4" in b.combination} == expected
+
+
+EXCAVATOR = b"""
+symgen: 1
+name: excavator
+gravity: [0, 0, -g]
+constants: {D2: 0.4, D3: 5.2, D4: 3.0, D7: 0.7, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0,        alpha: 0,     d: 0,   theta: q1, r: 0}
+  2: {ant: 1, sigma: 0,        alpha: pi/2,  d: D2,  theta: q2, r: 0}
+  3: {ant: 2, sigma: 0, mu: 0, alpha: 0,     d: D3,  theta: q3, r: 0}
+  4: {ant: 2, sigma: 0, mu: 0, alpha: 0,     d: D4,  theta: q4, r: 0}
+  5: {ant: 4, sigma: 1,        alpha: pi/2,  d: 0,   theta: 0,  r: q5}
+  6: {ant: 5, sigma: 0, mu: 0, alpha: -pi/2, d: 0,   theta: q6, r: 0}
+  7: {ant: 3, sigma: 2,        alpha: 0,     d: -D7, theta: 0,  r: 0}
+loops: [{cut: 6, twin: 7, start: {q3: -1.2, q5: 2.0}}]
+"""
+
+
+def test_excavator(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Swing, boom, stick on a jack: the mass of the rod acts at its eye on the stick. A sum of three squares is found without the large
+    linear system, which two jacks in a row make too large."""
+    monkeypatch.setattr(general, "MAX_UNKNOWNS", 0)
+    found = regroup(parse_robot(EXCAVATOR, "excavator.yaml"))
+    expected = {
+        "ZZ1R": "D2**2 + D3**2 + D7**2",
+        "XX2R": "-D3**2",
+        "ZZ2R": "D3**2",
+        "MX2R": "D3",
+        "XX3R": "-D7**2",
+        "ZZ3R": "D7**2",
+        "MX3R": "-D7",
+    }
+    assert {b.name: str(b.combination["M5"]) for b in found.base if "M5" in b.combination} == expected
 
 
 # --- certificates ------------------------------------------------------------------------------------------------------
