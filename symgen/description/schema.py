@@ -179,6 +179,8 @@ def explain(error: ValidationError) -> tuple[str, Path]:
         keys = _keys(path[:-1])
         close = difflib.get_close_matches(str(path[-1]), keys, 1)
         hint = f"; did you mean {close[0]!r}?" if close else ""
+        if path[0] in ("record", "signals") and len(path) == 1:
+            hint = "; this is a study file: the robot comes first, then the record or study"
         return f"{place}: unknown key {path[-1]!r}; expected {', '.join(keys)}{hint}", path
     if kind == "missing":
         return f"{'.'.join(str(key) for key in path[:-1]) or 'robot file'}: key {path[-1]!r} is missing; add it", path[:-1]

@@ -45,6 +45,7 @@ WRONG = [
     ("name: arm", "name: a b", 2, ["'a b'", "letter"]),
     ("name: arm", "name: class", 2, ["name: 'class'", "word of Python"]),
     ("name: arm", "name: [a]", 2, ["['a']", "expected text"]),
+    ("title: Test arm", "record: {files: [a.csv]}", 3, ["'record'", "this is a study file: the robot comes first"]),
     ("title: Test arm", "titel: Test arm", 3, ["'titel'", "did you mean 'title'"]),
     ("title: Test arm", 'title: "a\\nb"', 3, ["expected one line"]),
     ("title: Test arm", 'title: \'a"""b\'', 3, ["expected one line", "quotes"]),
