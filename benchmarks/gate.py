@@ -47,7 +47,7 @@ from runtime.resolution.run import NumpyWorkspace
 from runtime.settings.study import Study, study_from_mapping
 from symgen.description import load_robot
 from symgen.description.robot import Robot
-from symgen.emit.generate import generate_files, generate_module
+from symgen.emit.generate import derived, generate_files, generate_module
 from symgen.regroup.regrouping import _regrouped
 
 HERE = Path(__file__).resolve().parent
@@ -145,8 +145,9 @@ def ratios(folder: Path) -> list[Ratio]:
     def fill() -> None:
         filled[...] = 1.0
 
-    def derived(robot: Robot) -> None:
+    def derivation(robot: Robot) -> None:
         _regrouped.cache_clear()
+        derived.cache_clear()
         generate_module(robot)
 
     robots = {name: load_robot(name) for name in ("tx40", "panda")}
@@ -168,7 +169,7 @@ def ratios(folder: Path) -> list[Ratio]:
             timed(lambda: work.fit(task.levels[0], KEY), lambda: plain_run(task, KEY)),
         ),
         *(
-            Ratio(f"derivation to text, {name}", "import sympy", timed(lambda robot=robot: derived(robot), sympy))
+            Ratio(f"derivation to text, {name}", "import sympy", timed(lambda robot=robot: derivation(robot), sympy))
             for name, robot in robots.items()
         ),
         Ratio(
