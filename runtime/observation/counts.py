@@ -18,7 +18,7 @@ from scipy.ndimage import binary_opening, binary_propagation, maximum_filter1d
 from scipy.special import erf
 
 from runtime.observation.count_smoother import Lines, Smoothed, smoothed
-from runtime.observation.encoder_lattice import SHAKEN, Lattice, Unwrapping, lattice, shaken_share, to_and_fro
+from runtime.observation.encoder_lattice import SHAKEN, Lattice, shaken_share, to_and_fro, unwrapped_counts
 
 Array = np.ndarray
 
@@ -140,9 +140,7 @@ def read_counts(
     InputError
         No count changes; a step that is not positive or larger than the motion; positions off the lattice; counts that jump.
     """
-    known = lattice(position, step, phase, name=name)
-    unwrapping = Unwrapping(position.shape[1], name)
-    counts = unwrapping(known.counts(position))
+    known, counts, unwrapping = unwrapped_counts(position, step, phase, name=name)
     return _reading(counts, rate, known, lines, unwrapping.findings)
 
 

@@ -186,6 +186,14 @@ class Unwrapping:
         )
 
 
+def unwrapped_counts(
+    position: Array, step: Array | Sequence[float] | float | None = None, phase: Array | None = None, *, name: str = "record"
+) -> tuple[Lattice, Array, Unwrapping]:
+    """The lattice of positions (see `lattice`), their counts without wraps, shape (N, n), and what wrapped."""
+    known, unwrapping = lattice(position, step, phase, name=name), Unwrapping(position.shape[1], name)
+    return known, unwrapping(known.counts(position)), unwrapping
+
+
 def _step(x: Array, given: float | None, label: str, name: str) -> tuple[float, list[str]]:
     span = float(np.ptp(x))
     if given is None:

@@ -16,7 +16,7 @@ from runtime.errors import SettingsError
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, drives_of
 from runtime.observation.counts import Reading, read_counts
-from runtime.observation.encoder_lattice import Unwrapping, lattice
+from runtime.observation.encoder_lattice import unwrapped_counts
 from runtime.observation.filters import SpeedErrors, States, filtered_states
 from runtime.observation.sign_errors import switches
 from runtime.records.missing import COUNTS, Missing, require_positions
@@ -78,8 +78,7 @@ def unwrapped(model: GeneratedModel, record: Record, signals: Signals) -> Record
         return record
     drives = encoder_drives(model, signals)
     position = encoder_position(record.q, drives)
-    known, unwrapping = lattice(position, signals.step, name=record.name), Unwrapping(record.n, record.name)
-    counts = unwrapping(known.counts(position))
+    known, counts, unwrapping = unwrapped_counts(position, signals.step, name=record.name)
     if not unwrapping.wraps:
         return record
     x = known.position(counts)

@@ -38,7 +38,7 @@ def cestac(
     side: Annotated[str | None, typer.Option(help="joint or motor: where positions are rounded.")] = None,
     columns: Annotated[str | None, typer.Option(help="essential, all, or names separated by commas.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random rounding.")] = None,
-    workers: Annotated[int, typer.Option(min=0, help="Processes; 0: this one. The results do not depend on it.")] = 0,
+    workers: Annotated[int, typer.Option(min=0, help="Processes, this one among them. The results do not depend on it.")] = 0,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler whose workers do the runs, such as tcp://10.0.0.1:8786.")
     ] = None,

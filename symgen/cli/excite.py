@@ -29,7 +29,7 @@ def excite(
     starts: Annotated[int | None, typer.Option(min=1, help="Random starts.")] = None,
     rate: Annotated[float | None, typer.Option(help="Controller rate, Hz.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the starts.")] = None,
-    workers: Annotated[int, typer.Option(min=0, help="Processes; 0: this one. The results do not depend on it.")] = 0,
+    workers: Annotated[int, typer.Option(min=0, help="Processes, this one among them. The results do not depend on it.")] = 0,
     json: Annotated[bool, typer.Option("--json", help="Print excitation.json instead of tables.")] = False,
 ) -> None:
     """Search an exciting motion. Families, limits and distances: section `excitation` of a study file.

@@ -19,7 +19,7 @@ def fleet(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for summary.csv, .json, .txt and one folder per job.")
     ] = None,
-    workers: Annotated[int, typer.Option(min=0, help="Processes; 0: this one.")] = 0,
+    workers: Annotated[int, typer.Option(min=0, help="Processes, this one among them.")] = 0,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler whose workers do the jobs, such as tcp://10.0.0.1:8786.")
     ] = None,

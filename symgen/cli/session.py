@@ -25,7 +25,9 @@ BROKEN_PIPE, INTERRUPTED = 141, 130  # as shells have them: 128 + SIGPIPE, 128 +
 
 def single_thread() -> None:
     """One BLAS thread unless the user set another number: matrices here are small and results then agree in every bit. Before numpy loads."""
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "BLIS_NUM_THREADS"):
+    from runtime.blas import BLAS_THREADS
+
+    for name in BLAS_THREADS:
         os.environ.setdefault(name, "1")
 
 

@@ -24,6 +24,7 @@ from typing import IO, Any, cast
 
 import numpy as np
 
+from runtime.blas import BLAS_THREADS
 from runtime.errors import InputError
 from runtime.records.formats.columns import BLOCK, Array, Groups, Source, Table
 
@@ -33,7 +34,7 @@ SECONDS = 3
 BYTES_PER_SECOND = 10**6
 
 START = "import sys; sys.path[:] = sys.argv[1:]; from runtime.records.formats.child import serve; serve()"
-ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS", "MALLOC_ARENA_MAX"), "1")
+ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "POLARS_MAX_THREADS", "MALLOC_ARENA_MAX"), "1")
 
 
 @dataclass(frozen=True)
